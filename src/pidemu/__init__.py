@@ -1,0 +1,78 @@
+"""What a PID setting means on whose controller: emulate industrial PID algorithms and convert settings between them.
+
+Names are imported when first used, so that ``import pidemu`` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pidemu.card.library import cards, load_card
+    from pidemu.card.load import Card
+    from pidemu.conversion.convert import Conversion, convert
+    from pidemu.emulator import Controller
+    from pidemu.errors import (
+        CardError,
+        ConversionRefusedError,
+        PidemuError,
+        RecordError,
+        ScanError,
+        SettingError,
+        UnitError,
+    )
+    from pidemu.law import Law
+    from pidemu.settings import Settings
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "cards": "card.library",
+    "load_card": "card.library",
+    "Card": "card.load",
+    "Conversion": "conversion.convert",
+    "convert": "conversion.convert",
+    "Controller": "emulator",
+    "CardError": "errors",
+    "ConversionRefusedError": "errors",
+    "PidemuError": "errors",
+    "RecordError": "errors",
+    "ScanError": "errors",
+    "SettingError": "errors",
+    "UnitError": "errors",
+    "Law": "law",
+    "Settings": "settings",
+}
+
+__all__ = [
+    "Card",
+    "CardError",
+    "Controller",
+    "Conversion",
+    "ConversionRefusedError",
+    "Law",
+    "PidemuError",
+    "RecordError",
+    "ScanError",
+    "SettingError",
+    "Settings",
+    "UnitError",
+    "__version__",
+    "cards",
+    "convert",
+    "load_card",
+]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'pidemu' has no attribute '{name}'")
+    value = getattr(import_module(f"pidemu.{home}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,107 @@
+"""Finding cards: the built-in ones, and folders of the user's own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from pidemu.card.load import Card, load_file
+from pidemu.errors import CardNotFoundError, suggest
+
+ENVIRONMENT = "PIDEMU_VENDORS"
+"""Folders of cards, separated like PATH, searched before the built-in ones."""
+
+_loaded: dict[tuple[Path, int], Card] = {}
+
+
+def builtin_folder() -> Path:
+    """Return the folder of the built-in cards: in the wheel, or in the repository of an editable install.
+
+    Raises
+    ------
+    CardNotFoundError
+        Neither is there: the installation is damaged.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "vendors", package.parent.parent / "vendors"):
+        if folder.is_dir():
+            return folder
+    raise CardNotFoundError(f"no built-in cards beside {package}; install pidemu again")
+
+
+def folders(extra: Sequence[str | Path] = ()) -> list[Path]:
+    """Return the folders searched for cards, first hit wins: `extra`, those in PIDEMU_VENDORS, the built-in one.
+
+    Raises
+    ------
+    CardNotFoundError
+        A folder named by the user does not exist.
+    """
+    named = [Path(f) for f in extra] + [Path(f) for f in os.environ.get(ENVIRONMENT, "").split(os.pathsep) if f]
+    for folder in named:
+        if not folder.is_dir():
+            raise CardNotFoundError(f"no folder '{folder}'; a folder of cards holds <vendor>/<block>.yaml")
+    return [*named, builtin_folder()]
+
+
+def card_files(vendors: Sequence[str | Path] = ()) -> dict[str, Path]:
+    """Return the file of every card, by id, sorted."""
+    found: dict[str, Path] = {}
+    for folder in folders(vendors):
+        for file in folder.glob("*/*.yaml"):
+            found.setdefault(f"{file.parent.name}/{file.stem}", file)
+    return dict(sorted(found.items()))
+
+
+def cards(vendors: Sequence[str | Path] = ()) -> list[str]:
+    """Return the ids of all cards.
+
+    Parameters
+    ----------
+    vendors : sequence of path, optional
+        Folders of the user's own cards, searched before the built-in ones.
+    """
+    return list(card_files(vendors))
+
+
+def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
+    """Return a card.
+
+    Parameters
+    ----------
+    name : str
+        The card's id, such as ``"fisher/provox"``, or the path of a ``.yaml`` file.
+    vendors : sequence of path, optional
+        Folders of the user's own cards, searched before the built-in ones.
+
+    Returns
+    -------
+    Card
+        The card, read once and kept as long as its file does not change.
+
+    Raises
+    ------
+    CardNotFoundError
+        There is no such card.
+    CardError
+        The card is wrong.
+    """
+    file = Path(name) if name.endswith((".yaml", ".yml")) else None
+    if file is None:
+        file = next((f for d in folders(vendors) if (f := d / f"{name}.yaml").is_file()), None) if _is_id(name) else None
+        if file is None:
+            known = cards(vendors)
+            hint = suggest(name, known) or suggest(name.rsplit("/", 1)[-1], [k.split("/")[1] for k in known])
+            raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
+    elif not file.is_file():
+        raise CardNotFoundError(f"no file '{name}'")
+    key = (file.resolve(), file.stat().st_mtime_ns)
+    if key not in _loaded:
+        _loaded[key] = load_file(file)
+    return _loaded[key]
+
+
+def _is_id(name: str) -> bool:
+    parts = name.split("/")
+    return len(parts) == 2 and all(p not in ("", ".", "..") and "\\" not in p for p in parts)

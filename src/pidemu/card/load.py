@@ -1,0 +1,335 @@
+"""A card file to a `Card`, and a card with its options chosen to a `Variant`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from pidemu.card.faults import problems
+from pidemu.card.models import CardFile, Equation, Evidence, Setting, Status
+from pidemu.card.source import Document, Path_, parse_file
+from pidemu.errors import CardError, Problem, SettingError, suggest
+
+if TYPE_CHECKING:
+    from pidemu.settings import Settings
+
+_REPLACED_WHOLE = ("filter", "windup")
+EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
+
+
+def overlay(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `base` overlaid with `top`: mappings key by key, ``filter`` and ``windup`` whole, null removes."""
+    merged = dict(base)
+    for key, value in top.items():
+        old = merged.get(key)
+        if value is None:
+            merged.pop(key, None)
+        elif isinstance(value, dict) and isinstance(old, dict) and key not in _REPLACED_WHOLE:
+            merged[key] = overlay(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _holds(value: Any, path: Path_) -> bool:
+    for step in path:
+        if not (isinstance(value, dict) and step in value) and not (isinstance(value, list) and isinstance(step, int)):
+            return False
+        value = value[step]
+    return True
+
+
+def leaves(value: Any, path: Path_ = ()) -> Iterator[Path_]:
+    """Yield the path of every scalar or list in nested mappings."""
+    if isinstance(value, dict) and value:
+        for key, item in value.items():
+            yield from leaves(item, (*path, key))
+    else:
+        yield path
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One field of a variant's equation and how sure it is.
+
+    Attributes
+    ----------
+    path : str
+        The field, such as ``derivative.filter.ratio``.
+    value : object
+        What the card says.
+    evidence : Evidence or None
+        The nearest evidence above it.
+    key : str
+        The evidence's own path in the card.
+    """
+
+    path: str
+    value: Any
+    evidence: Evidence | None
+    key: str
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A card with its options chosen.
+
+    Attributes
+    ----------
+    card : Card
+        The card.
+    chosen : dict
+        Choice by option, all options.
+    equation : Equation
+        The overlaid fields.
+    """
+
+    card: Card
+    chosen: Mapping[str, str]
+    equation: Equation
+    raw: Mapping[str, Any] = field(repr=False)
+
+    def home(self, path: Path_) -> Path_:
+        """Return where a field of the equation stands in the file: in a chosen overlay, or in the card itself."""
+        for option, choice in reversed(self.chosen.items()):
+            where = ("options", option, "choices", choice)
+            if _holds(self.card.document.value, (*where, *path)):
+                return (*where, *path)
+        return path
+
+    def statements(self) -> list[Statement]:
+        """Return every field of the equation with its evidence, in the order of the card."""
+        found = []
+        for path in leaves(self.raw):
+            home = self.home(path)
+            dotted = ".".join(map(str, home))
+            key = self.card.evidence_key(home)
+            value: Any = self.raw
+            for step in path:
+                value = value[step]
+            found.append(Statement(".".join(map(str, path)), value, self.card.data.evidence.get(key or ""), key or dotted))
+        return found
+
+    def assumptions(self) -> list[Statement]:
+        """Return what this variant only assumes: one statement per evidence entry."""
+        seen: dict[str, Statement] = {}
+        for statement in self.statements():
+            if statement.evidence is not None and statement.evidence.status is Status.ASSUMED:
+                seen.setdefault(statement.key, statement)
+        return list(seen.values())
+
+
+@dataclass(frozen=True)
+class Card:
+    """One PID algorithm of one product, as a card describes it.
+
+    Attributes
+    ----------
+    id : str
+        ``vendor/block``, from the file's place.
+    data : CardFile
+        What the card says.
+    document : Document
+        The file, with places.
+    """
+
+    id: str
+    data: CardFile
+    document: Document = field(repr=False)
+    _variants: dict[tuple[str, ...], Variant] = field(default_factory=dict, repr=False, compare=False)
+
+    def __hash__(self) -> int:
+        return hash(self.id)
+
+    @property
+    def title(self) -> str:
+        """Vendor, product and algorithm in one line."""
+        return f"{self.data.vendor} {self.data.product}: {self.data.algorithm}"
+
+    @property
+    def options(self) -> dict[str, tuple[str, ...]]:
+        """Choices by option; the default comes first."""
+        return {
+            name: (o.default, *(c for c in o.choices if c != o.default)) for name, o in self.data.options.items()
+        }
+
+    def evidence_key(self, path: Path_) -> str | None:
+        """Return the longest evidence path at or above `path`."""
+        for end in range(len(path), 0, -1):
+            key = ".".join(map(str, path[:end]))
+            if key in self.data.evidence:
+                return key
+        return None
+
+    def all_settings(self) -> dict[str, Setting]:
+        """Return every dial that any choice of options offers, by name."""
+        found = dict(self.data.settings)
+        for name, option in self.data.options.items():
+            for choice in option.choices:
+                for dial, setting in self.variant({name: choice}).equation.settings.items():
+                    found.setdefault(dial, setting)
+        return found
+
+    def variant(self, options: Mapping[str, object] | None = None) -> Variant:
+        """Return the card with options chosen; those not named take their defaults.
+
+        Parameters
+        ----------
+        options : mapping, optional
+            Choice by option. Upper and lower case are the same where that is unambiguous.
+
+        Raises
+        ------
+        SettingError
+            An option or a choice is unknown.
+        CardError
+            The choices do not go together.
+        """
+        chosen = {name: o.default for name, o in self.data.options.items()}
+        for given, choice in (options or {}).items():
+            name = _match(given, chosen)
+            if name is None:
+                known = ", ".join(chosen) or "none"
+                raise SettingError(f"{self.id}: unknown option '{given}'{suggest(given, chosen)}; options: {known}")
+            choices = self.data.options[name].choices
+            word = _match(str(choice), choices)
+            if word is None:
+                raise SettingError(
+                    f"{self.id}: option {name} has no choice '{choice}'{suggest(str(choice), choices)}; "
+                    f"choices: {', '.join(choices)}"
+                )
+            chosen[name] = word
+        key = tuple(chosen.values())
+        if key not in self._variants:
+            self._variants[key] = self._build(chosen)
+        return self._variants[key]
+
+    def _build(self, chosen: dict[str, str]) -> Variant:
+        raw: dict[str, Any] = {k: self.document.value[k] for k in EQUATION_KEYS if k in self.document.value}
+        for option, choice in chosen.items():
+            raw = overlay(raw, self.data.options[option].choices[choice])
+        raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
+        return Variant(self, chosen, _equation(raw, self.document, chosen), raw)
+
+    def settings(self, given: Mapping[str, object] | None = None, /, **values: object) -> Settings:
+        """Return settings of this card.
+
+        Parameters
+        ----------
+        given : mapping, optional
+            Settings and options by name, where a keyword will not do.
+        **values
+            Settings and options by name: a number in the card's unit, a string with a unit (``"20 s/repeat"``), or the name of a
+            choice. ``pv_range`` and ``op_range``, pairs of engineering units, state the signal ranges.
+
+        Returns
+        -------
+        Settings
+            The settings, with defaults filled in and every conversion noted.
+
+        Raises
+        ------
+        SettingError
+            A setting is unknown, missing or out of range.
+        UnitError
+            A value cannot be read or has the wrong dimension.
+
+        Examples
+        --------
+        >>> import pidemu
+        >>> s = pidemu.load_card("fisher/provox").settings(GAIN=2.0, RESET=4, RATE="30 s")
+        >>> s["RESET"].to("s/repeat")
+        15.0
+        """
+        from pidemu.settings import make_settings  # settings depend on cards, not cards on settings
+
+        return make_settings(self, {**(given or {}), **values})
+
+
+def _match(word: str, known: Mapping[str, Any]) -> str | None:
+    if word in known:
+        return word
+    folded = [k for k in known if k.casefold() == word.casefold()]
+    return folded[0] if len(folded) == 1 else None
+
+
+def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]) -> Equation:
+    def locate(path: Path_) -> Path_:
+        for option, choice in reversed(chosen.items()):
+            where = ("options", option, "choices", choice)
+            if path and _holds(document.value, (*where, *path)):
+                return (*where, *path)
+        return path
+
+    try:
+        return Equation.model_validate(raw)
+    except ValidationError as error:
+        raise CardError(problems(error, raw, Equation, document, locate)) from None
+
+
+def card_from(document: Document, card_id: str) -> Card:
+    """Return the card that a document describes.
+
+    Parameters
+    ----------
+    document : Document
+        The file, read.
+    card_id : str
+        ``vendor/block``.
+
+    Raises
+    ------
+    CardError
+        The document is no valid card: every problem, located, in the card itself and in each choice of its options.
+    """
+    try:
+        data = CardFile.model_validate(document.value)
+    except ValidationError as error:
+        raise CardError(sorted(problems(error, document.value, CardFile, document, lambda p: p))) from None
+    card = Card(card_id, data, document)
+    found: list[Problem] = []
+    for name, option in data.options.items():
+        if option.default not in option.choices:
+            message = f"default '{option.default}' is not one of the choices: {', '.join(option.choices)}"
+            raise CardError([document.problem(("options", name, "default"), message)])
+    for name, option in data.options.items():
+        for choice, fields in option.choices.items():
+            where = ("options", name, "choices", choice)
+            unknown = [key for key in fields if key not in EQUATION_KEYS]
+            found += [
+                document.problem((*where, key), f"unknown key '{key}'{suggest(key, EQUATION_KEYS)}", at_key=True)
+                for key in unknown
+            ]
+            if not unknown:
+                try:
+                    card.variant({name: choice})
+                except CardError as error:
+                    found += error.problems
+    if found:
+        raise CardError(sorted(set(found)))
+    return card
+
+
+def load_file(file: Path, card_id: str | None = None, shown: str | None = None) -> Card:
+    """Read a card from a file.
+
+    Parameters
+    ----------
+    file : Path
+        ``<vendor>/<block>.yaml``.
+    card_id : str, optional
+        Its id; by default from the last two parts of the path.
+    shown : str, optional
+        The file's name in messages.
+
+    Raises
+    ------
+    CardError
+        See `card_from` and `parse_file`.
+    """
+    resolved = file.resolve()
+    return card_from(parse_file(file, shown), card_id or f"{resolved.parent.name}/{resolved.stem}")

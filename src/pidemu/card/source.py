@@ -1,0 +1,231 @@
+"""YAML text to plain values, each with its place in the file.
+
+YAML 1.2 core scalars (``1e-3`` is a number, ``off`` and ``no`` are words), no duplicate keys, no aliases, no tags. Whatever
+the text, the answer is a document or a list of located problems.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from pidemu.errors import CardError, Problem
+
+Path_ = tuple[str | int, ...]
+"""Keys and indices that lead to a value."""
+
+_Loader: Final[Any] = getattr(yaml, "CLoader", yaml.Loader)
+_MAX_DEPTH: Final = 32
+
+_INT: Final = re.compile(r"[-+]?[0-9]+$")
+_FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
+_INF: Final = re.compile(r"([-+]?)\.(inf|Inf|INF)$")
+_WORDS: Final = {"": None, "~": None, "null": None, "Null": None, "NULL": None} | {
+    w: value for value in (True, False) for w in (str(value).lower(), str(value), str(value).upper())
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a key or value stands: 1-based line and column, and its width on that line."""
+
+    line: int
+    column: int
+    width: int
+
+
+@dataclass
+class Document:
+    """A YAML file, read.
+
+    Attributes
+    ----------
+    path : str
+        The file as the user named it.
+    lines : tuple of str
+        Its text.
+    value : object
+        Plain dicts, lists and scalars.
+    values, keys : dict
+        Place of every value, and of every mapping key, by path.
+    """
+
+    path: str
+    lines: tuple[str, ...]
+    value: Any = None
+    values: dict[Path_, Place] = field(default_factory=dict)
+    keys: dict[Path_, Place] = field(default_factory=dict)
+
+    def problem(self, path: Path_, message: str, *, at_key: bool = False) -> Problem:
+        """Return a problem placed at `path`, or at the nearest enclosing thing that exists."""
+        places = (self.keys, self.values) if at_key else (self.values, self.keys)
+        for end in range(len(path), -1, -1):
+            for table in places:
+                place = table.get(path[:end])
+                if place is not None:
+                    return Problem(self.path, place.line, place.column, message, place.width, self.lines)
+        return Problem(self.path, 1, 1, message, 1, self.lines)
+
+
+def _scalar(text: str, plain: bool) -> Any:
+    if not plain:
+        return text
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INT.match(text):
+        return int(text) if len(text) < 300 else float(text)
+    if _FLOAT.match(text):
+        return float(text)
+    if match := _INF.match(text):
+        return -math.inf if match[1] == "-" else math.inf
+    return math.nan if text in (".nan", ".NaN", ".NAN") else text
+
+
+class _Reader:
+    """Builds the document from parser events, without recursion into the C parser's own composer."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.problems: list[Problem] = []
+        self.events: Any = None
+
+    def fail(self, mark: Any, message: str, width: int = 1) -> None:
+        self.problems.append(
+            Problem(self.document.path, mark.line + 1, mark.column + 1, message, width, self.document.lines)
+        )
+
+    def place(self, event: Any) -> Place:
+        start, end = event.start_mark, event.end_mark
+        width = end.column - start.column if end.line == start.line else 1
+        return Place(start.line + 1, start.column + 1, max(1, width))
+
+    def read(self, event: Any, path: Path_) -> Any:
+        self.document.values[path] = self.place(event)
+        tag = getattr(event, "tag", None)
+        if tag not in (None, "!"):
+            self.fail(event.start_mark, f"tag '{tag}' is not used in cards; remove it")
+        if isinstance(event, yaml.AliasEvent):
+            self.fail(event.start_mark, f"alias '*{event.anchor}' is not used in cards; write the value out")
+            return None
+        if isinstance(event, yaml.ScalarEvent):
+            return _scalar(event.value, event.implicit[0])
+        if len(path) > _MAX_DEPTH:
+            self.fail(event.start_mark, f"nested more than {_MAX_DEPTH} levels deep")
+            raise CardError(self.problems)
+        if isinstance(event, yaml.SequenceStartEvent):
+            items: list[Any] = []
+            while not isinstance(child := next(self.events), yaml.SequenceEndEvent):
+                items.append(self.read(child, (*path, len(items))))
+            return items
+        return self.read_mapping(path)
+
+    def read_mapping(self, path: Path_) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        while not isinstance(key := next(self.events), yaml.MappingEndEvent):
+            if not isinstance(key, yaml.ScalarEvent):
+                self.fail(key.start_mark, "a key must be a plain word")
+                name = f"?{len(mapping)}"
+                self.read(key, (*path, name))
+            else:
+                name = key.value
+            here = (*path, name)
+            if name in mapping:
+                first = self.document.keys[here].line
+                self.fail(key.start_mark, f"duplicate key '{name}' (first on line {first}); keep one", len(name))
+                here = (*path, f"{name} ")
+            self.document.keys[here] = self.place(key)
+            value = self.read(next(self.events), here)
+            mapping.setdefault(name, value)
+        return mapping
+
+
+def parse(text: str, path: str) -> Document:
+    """Read one YAML document.
+
+    Parameters
+    ----------
+    text : str
+        The file's text.
+    path : str
+        The file's name, for messages.
+
+    Returns
+    -------
+    Document
+        Its values with their places.
+
+    Raises
+    ------
+    CardError
+        The text is no YAML, is empty, or uses what cards do not: every problem found, with its place.
+    """
+    document = Document(path, tuple(text.splitlines()))
+    reader = _Reader(document)
+    try:
+        reader.events = iter(yaml.parse(text, Loader=_Loader))
+        roots = 0
+        for event in reader.events:
+            if isinstance(event, yaml.NodeEvent):
+                roots += 1
+                if roots > 1:
+                    reader.fail(event.start_mark, "a second document; a card is one document, put it in a file of its own")
+                    break
+                document.value = reader.read(event, ())
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        if line > len(document.lines):  # the parser's mark lies past the text
+            line = max(1, len(document.lines))
+            column = len(document.lines[-1]) + 1 if document.lines else 1
+        message = f"not YAML: {error.problem or error.context}"
+        reader.problems.append(Problem(path, line, column, message, 1, document.lines))
+    except yaml.reader.ReaderError as error:
+        before = text[: error.position] if isinstance(error.position, int) else ""
+        code = error.character if isinstance(error.character, int) else ord(error.character)
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        message = f"character U+{code:04X} is not allowed in YAML; remove it"
+        reader.problems.append(Problem(path, line, column, message, 1, document.lines))
+    except UnicodeEncodeError as error:
+        before = text[: error.start]
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        reader.problems.append(Problem(path, line, column, "half a Unicode pair; remove it", 1, document.lines))
+    if not reader.problems and not isinstance(document.value, dict):
+        kind = "empty" if document.value is None else "not a mapping"
+        reader.problems.append(
+            Problem(path, 1, 1, f"the file is {kind}; a card starts with 'card: 1'", 1, document.lines)
+        )
+    if reader.problems:
+        raise CardError(sorted(reader.problems))
+    return document
+
+
+def parse_file(file: Path, shown: str | None = None) -> Document:
+    """Read one YAML file.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    shown : str, optional
+        Its name in messages; by default `file` itself.
+
+    Raises
+    ------
+    CardError
+        It cannot be read, is not UTF-8, or is wrong (see `parse`).
+    """
+    name = shown or str(file)
+    try:
+        return parse(file.read_text(encoding="utf-8-sig"), name)
+    except UnicodeDecodeError as error:
+        line = file.read_bytes()[: error.start].count(b"\n") + 1
+        raise CardError([Problem(name, line, 1, "not UTF-8 text; save the file as UTF-8")]) from None
+    except OSError as error:
+        raise CardError([Problem(name, 1, 1, f"cannot be read: {error.strerror}")]) from None
+
+

@@ -1,0 +1,1 @@
+"""Settings of one controller into settings of another, and the certificate that says how near they are."""

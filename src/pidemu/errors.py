@@ -1,0 +1,140 @@
+"""Every error of the package.
+
+::
+
+    PidemuError
+    ├── CardError            a card, or a folder of cards, is wrong; holds located problems
+    │   └── CardNotFoundError
+    ├── UnitError            a value or unit cannot be read or does not fit the dial
+    ├── SettingError         a setting or option of a card is unknown, missing or out of range
+    ├── ScanError            an algorithm cannot be run at this scan interval or with these limits
+    ├── RecordError          a recorded signal file cannot be used
+    └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pidemu.conversion.convert import Conversion
+
+
+class PidemuError(Exception):
+    """Base of every error pidemu raises on purpose: one cause, one remedy."""
+
+
+@dataclass(frozen=True, order=True)
+class Problem:
+    """One fault in a text file, with its place.
+
+    Attributes
+    ----------
+    path : str
+        The file as the user named it.
+    line, column : int
+        1-based place of the offending token.
+    message : str
+        The cause and, where there is one, the remedy.
+    width : int
+        Length of the offending token, for the marks under it.
+    source : tuple of str
+        All lines of the file, for the excerpt.
+    """
+
+    path: str
+    line: int
+    column: int
+    message: str
+    width: int = 1
+    source: tuple[str, ...] = ()
+
+    def headline(self) -> str:
+        """Return ``path:line:column: message``."""
+        return f"{self.path}:{self.line}:{self.column}: {self.message}"
+
+    def render(self) -> str:
+        """Return the headline with the lines around and marks under the token, as a compiler prints it."""
+        if not 1 <= self.line <= len(self.source):
+            return self.headline()
+        gutter = len(str(self.line + 1)) + 2
+        out = [self.headline()]
+        for number in range(max(1, self.line - 1), min(len(self.source), self.line + 1) + 1):
+            out.append(f"{number:>{gutter}} | {self.source[number - 1]}".rstrip())
+            if number == self.line:
+                out.append(" " * gutter + " | " + " " * (self.column - 1) + "^" * max(1, self.width))
+        return "\n".join(out)
+
+
+class CardError(PidemuError):
+    """A card is wrong.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+        Every fault found, in the order of the file.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(p.render() for p in self.problems))
+
+
+class CardNotFoundError(CardError):
+    """No card has this id."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(())
+        self.args = (message,)
+
+
+class UnitError(PidemuError):
+    """A value or a unit cannot be read, or has the wrong dimension for its dial."""
+
+
+class SettingError(PidemuError):
+    """A setting or an option is unknown, missing, out of range or not a number."""
+
+
+class ScanError(PidemuError):
+    """An algorithm cannot be run as asked: scan interval, limits, engine or signals."""
+
+
+class RecordError(PidemuError):
+    """A file of recorded signals cannot be used."""
+
+
+class ConversionRefusedError(PidemuError):
+    """The target cannot reproduce the source.
+
+    Attributes
+    ----------
+    nearest : Conversion or None
+        The nearest settings inside the target's ranges, with the certificate that states their cost;
+        ``None`` where the target has no settings that come near.
+    """
+
+    def __init__(self, message: str, nearest: Conversion | None = None) -> None:
+        super().__init__(message)
+        self.nearest = nearest
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the nearest known word, or an empty string.
+
+    Parameters
+    ----------
+    word : str
+        What was written.
+    known : iterable of str
+        What could have been written.
+    """
+    known = list(known)
+    folded = {k.casefold(): k for k in known}
+    if word.casefold() in folded:
+        return f" (did you mean '{folded[word.casefold()]}'?)"
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f" (did you mean '{near[0]}'?)" if near else ""

@@ -1,0 +1,364 @@
+"""The linear law: what a PID algorithm does to small signals (specs/equations.md, sections 2 and 4).
+
+Unlimited and in automatic, every controller is ``U = Cr R - Cy Y`` (reverse acting). Both paths are rational: in ``s`` for the
+continuous law, in ``q = z^-1`` for the discrete law of one scan interval. The paths are written once, in `paths`, in terms of
+three operators: integrator, differentiator and lag; the continuous and the discrete law differ in these only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.models import Rule
+from pidemu.errors import ScanError
+
+PathName = Literal["feedback", "setpoint"]
+Response = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Rational:
+    """A quotient of two polynomials in one operator; coefficients ascend from the constant.
+
+    Attributes
+    ----------
+    num, den : tuple of float
+        Coefficients of numerator and denominator.
+    """
+
+    num: tuple[float, ...]
+    den: tuple[float, ...] = (1.0,)
+
+    def __add__(self, other: Rational | float) -> Rational:
+        o = _rational(other)
+        return Rational(_add(_mul(self.num, o.den), _mul(o.num, self.den)), _mul(self.den, o.den))
+
+    def __mul__(self, other: Rational | float) -> Rational:
+        o = _rational(other)
+        return Rational(_mul(self.num, o.num), _mul(self.den, o.den))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __call__(self, x: npt.ArrayLike) -> Response:
+        """Return the value at the operator's values `x`."""
+        at = np.asarray(x, dtype=np.complex128)
+        value: Response = _horner(self.num, at) / _horner(self.den, at)
+        return value
+
+
+def _rational(x: Rational | float) -> Rational:
+    return x if isinstance(x, Rational) else Rational((float(x),))
+
+
+def _add(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
+    n = max(len(a), len(b))
+    return tuple((a[i] if i < len(a) else 0.0) + (b[i] if i < len(b) else 0.0) for i in range(n))
+
+
+def _mul(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
+    out = [0.0] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            out[i + j] += x * y
+    return tuple(out)
+
+
+def _horner(coefficients: Sequence[float], x: Response) -> Response:
+    value = np.zeros_like(x)
+    for c in reversed(coefficients):
+        value = value * x + c
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Operators:
+    """What stands for integration, filtered differentiation and lag.
+
+    Attributes
+    ----------
+    integrator : object
+        ``1/s``.
+    differentiator : callable
+        From filter time [s] to ``s/(1 + Tf s)``.
+    lag : callable
+        From filter time [s] and order to ``1/(1 + Tf s)`` or ``1/(1 + Tf s + Tf^2 s^2/2)``.
+    """
+
+    integrator: Any
+    differentiator: Callable[[Any], Any]
+    lag: Callable[[Any, int], Any]
+
+
+def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
+    """Return feedback and setpoint path of an algorithm (specs/equations.md, section 2).
+
+    Parameters
+    ----------
+    a : Algorithm
+        The algorithm; its numbers may be arrays where `op` works on arrays.
+    op : Operators
+        The operators, rational functions or their values at some frequencies.
+
+    Returns
+    -------
+    feedback, setpoint
+        ``Cy`` and ``Cr``, of the type that the operators make.
+    """
+    d = op.differentiator(a.Tf if a.filter_on == "term" else 0.0)
+    pi = a.ki * op.integrator + a.kp
+    if a.series:
+        lead = d * a.derivative_per_gain
+        feedback = pi * (lead + 1.0)
+        setpoint = pi * (lead * a.c + 1.0) + a.kp * (a.b - 1.0)
+    else:
+        feedback = pi + d * a.kd
+        setpoint = pi + a.kp * (a.b - 1.0) + d * (a.kd * a.c)
+    if a.filter_on == "measurement":
+        feedback = feedback * op.lag(a.Tf, a.filter_order)
+    elif a.filter_on == "output":
+        lag = op.lag(a.Tf, a.filter_order)
+        feedback, setpoint = feedback * lag, setpoint * lag
+    return feedback, setpoint
+
+
+CONTINUOUS: Final = Operators(
+    integrator=Rational((1.0,), (0.0, 1.0)),
+    differentiator=lambda Tf: Rational((0.0, 1.0), (1.0, Tf)),
+    lag=lambda Tf, order: Rational((1.0,), (1.0, Tf, Tf * Tf / 2) if order == 2 else (1.0, Tf)),
+)
+"""Rational functions of ``s``."""
+
+
+def at_frequencies(w: npt.ArrayLike) -> Operators:
+    """Return the continuous operators' values at frequencies `w` [rad/s], for numbers or arrays of settings."""
+    s = 1j * np.asarray(w, dtype=float)
+    return Operators(
+        integrator=1 / s,
+        differentiator=lambda Tf: s / (1 + Tf * s),
+        lag=lambda Tf, order: 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s),
+    )
+
+
+def discrete_operators(a: Algorithm, h: float) -> Operators:
+    """Return the operators of an algorithm's scan rules, rational in ``q = z^-1`` (specs/equations.md, section 4).
+
+    Parameters
+    ----------
+    a : Algorithm
+        The algorithm, for its rules.
+    h : float
+        Scan interval [s].
+
+    Raises
+    ------
+    ScanError
+        The forward rule is unstable at this interval (``Tf <= h/2``).
+    """
+
+    def s_of(rule: Rule) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        match rule:
+            case Rule.BACKWARD:
+                return (1.0, -1.0), (h,)
+            case Rule.FORWARD:
+                return (1.0, -1.0), (0.0, h)
+            case Rule.TRAPEZOIDAL:
+                return (2.0, -2.0), (h, h)
+
+    integral = s_of(a.integral_rule)
+
+    def differentiator(Tf: float) -> Rational:
+        check_filter(a.derivative_rule, Tf, h)
+        top, bottom = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
+        return Rational(top, _add(bottom, _mul((Tf,), top)))
+
+    def lag(Tf: float, order: int) -> Rational:
+        check_filter(a.filter_rule, Tf, h)
+        top, bottom = s_of(a.filter_rule)
+        if order == 1 or not Tf:
+            return Rational(bottom, _add(bottom, _mul((Tf,), top))) if Tf else Rational((1.0,))
+        square = _mul(bottom, bottom)
+        den = _add(_add(square, _mul((Tf,), _mul(top, bottom))), _mul((Tf * Tf / 2,), _mul(top, top)))
+        return Rational(square, den)
+
+    return Operators(Rational(integral[1], integral[0]), differentiator, lag)
+
+
+def check_filter(rule: Rule, Tf: float, h: float) -> None:
+    """Refuse a forward-rule filter that is unstable.
+
+    Raises
+    ------
+    ScanError
+        ``0 < Tf <= h/2`` with the forward rule.
+    """
+    if rule is Rule.FORWARD and 0 < Tf <= h / 2:
+        raise ScanError(
+            f"the filter time {Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
+            f"use a scan interval below {2 * Tf:g} s or no filter"
+        )
+
+
+@dataclass(frozen=True)
+class Law:
+    """The linear law of a controller, reverse acting.
+
+    Attributes
+    ----------
+    feedback, setpoint : Rational
+        ``Cy`` and ``Cr``: in ``s``, or in ``q = z^-1`` when `scan` is given.
+    scan : float or None
+        Scan interval [s] of the discrete law.
+    """
+
+    feedback: Rational
+    setpoint: Rational
+    scan: float | None = None
+
+    def path(self, name: PathName) -> Rational:
+        """Return the path of this name.
+
+        Raises
+        ------
+        ValueError
+            `name` is neither ``"feedback"`` nor ``"setpoint"``.
+        """
+        if name not in ("feedback", "setpoint"):
+            raise ValueError(f"path is '{name}'; it is 'feedback' or 'setpoint'")
+        return self.feedback if name == "feedback" else self.setpoint
+
+    def response(self, w: npt.ArrayLike, path: PathName = "feedback") -> Response:
+        """Return the frequency response.
+
+        Parameters
+        ----------
+        w : array_like, shape (n,) or scalar
+            Angular frequencies [rad/s], above zero; for the discrete law below ``pi/scan``.
+        path : {"feedback", "setpoint"}
+            Which path.
+
+        Returns
+        -------
+        ndarray of complex, shape of `w`
+            Gain [%/%] and phase of the path.
+        """
+        s = 1j * np.asarray(w, dtype=float)
+        return self.path(path)(s if self.scan is None else np.exp(-s * self.scan))
+
+    def coefficients(self) -> tuple[float, float, float, float, float]:
+        """Return ``n0, n1, n2, d1, d2`` of the continuous feedback path (specs/equations.md, section 2).
+
+        Raises
+        ------
+        ValueError
+            The law is discrete.
+        """
+        self._continuous()
+        num, den = self.feedback.num, self.feedback.den
+        if den[0] == 0:
+            den = den[1:]
+        else:
+            num = (0.0, *num)
+        n0, n1, n2 = (*(x / den[0] for x in num), 0.0, 0.0, 0.0)[:3]
+        d1, d2 = (*(x / den[0] for x in den[1:]), 0.0, 0.0)[:2]
+        return n0, n1, n2, d1, d2
+
+    def moments(self, path: PathName = "feedback") -> tuple[float, float, float]:
+        """Return ``m0, m1, m2`` of ``s C(s) = m0 + m1 s + m2 s^2 + ...`` (specs/equations.md, section 2).
+
+        Raises
+        ------
+        ValueError
+            The law is discrete.
+        """
+        self._continuous()
+        r = self.path(path)
+        num, den = (r.num, r.den[1:]) if r.den[0] == 0 else ((0.0, *r.num), r.den)
+        n = [x / den[0] for x in (*num, 0.0, 0.0, 0.0)[:3]]
+        d1, d2 = (*(x / den[0] for x in den[1:]), 0.0, 0.0)[:2]
+        m0 = n[0]
+        m1 = n[1] - d1 * m0
+        return m0, m1, n[2] - d1 * m1 - d2 * m0
+
+    def kick(self) -> float:
+        """Return the output step that a unit setpoint step makes at once [%/%]; infinite for an unfiltered derivative on error.
+
+        For the discrete law it is the first sample.
+        """
+        if self.scan is not None:
+            return self.setpoint.num[0] / self.setpoint.den[0]
+        num, den = _trim(self.setpoint.num), _trim(self.setpoint.den)
+        if len(num) > len(den):
+            return math.copysign(math.inf, num[-1])
+        return num[-1] / den[-1] if len(num) == len(den) else 0.0
+
+    def impulse(self, n: int, path: PathName = "feedback") -> npt.NDArray[np.float64]:
+        """Return the first `n` samples of the discrete impulse response.
+
+        Parameters
+        ----------
+        n : int
+            Number of samples.
+        path : {"feedback", "setpoint"}
+            Which path.
+
+        Returns
+        -------
+        ndarray of float, shape (n,)
+            Output [%] per unit impulse [%] at the first scan.
+
+        Raises
+        ------
+        ValueError
+            The law is continuous.
+        """
+        if self.scan is None:
+            raise ValueError("the continuous law has no samples; give law() a scan interval")
+        num, den = self.path(path).num, self.path(path).den
+        out = np.zeros(n)
+        for i in range(n):
+            value = num[i] if i < len(num) else 0.0
+            for j in range(1, min(i + 1, len(den))):
+                value -= den[j] * out[i - j]
+            out[i] = value / den[0]
+        return out
+
+    def _continuous(self) -> None:
+        if self.scan is not None:
+            raise ValueError("this is the discrete law; the coefficients belong to the continuous one")
+
+
+def _trim(coefficients: Sequence[float]) -> list[float]:
+    trimmed = list(coefficients)
+    while len(trimmed) > 1 and trimmed[-1] == 0:
+        trimmed.pop()
+    return trimmed
+
+
+def law_of(algorithm: Algorithm, scan: float | None = None) -> Law:
+    """Return the law of an algorithm.
+
+    Parameters
+    ----------
+    algorithm : Algorithm
+        The algorithm.
+    scan : float, optional
+        Scan interval [s]: the discrete law. Without it: the continuous law.
+
+    Raises
+    ------
+    ScanError
+        The scan interval is not a positive number, or a filter is unstable at it.
+    """
+    if scan is None:
+        return Law(*paths(algorithm, CONTINUOUS))
+    if not (math.isfinite(scan) and scan > 0):
+        raise ScanError(f"scan interval {scan:g} s is not a positive number")
+    return Law(*paths(algorithm, discrete_operators(algorithm, scan)), scan=scan)

@@ -1,0 +1,1 @@
+"""What a controller does scan by scan: programs, and the blocks they are built from."""

@@ -1,0 +1,1 @@
+"""Back ends that print or run a scan program."""

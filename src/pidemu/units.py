@@ -1,0 +1,325 @@
+"""Dial quantities: how a number on a controller's dial becomes a canonical one, and back.
+
+Canonical values (specs/equations.md, section 1):
+
+=================== ======================================= =========
+role of the dial    canonical quantity                      unit
+=================== ======================================= =========
+gain                proportional gain                       %/%
+integral            reset rate ``1/Ti``, or ``ki``          1/s
+derivative          ``Td``, or ``kd``                       s
+filter-time         filter time constant                    s
+tracking-time       tracking time constant                  s
+all others          the plain ratio                         1
+=================== ======================================= =========
+
+Unit conversion is exact rational arithmetic, rounded once, so that 4 repeats per minute are 15 s per repeat and not
+15.000000000000002. Infinity is a value of the integral time (no integral action); zero is its reset rate.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+from typing import Final
+
+from pidemu.errors import UnitError, suggest
+
+
+class Dimension(StrEnum):
+    """What kind of quantity a unit measures; the value is the word used in messages."""
+
+    RATIO = "a plain ratio"
+    PERCENT = "a percentage"
+    PV_UNITS = "engineering units of the measurement"
+    OP_PER_PV = "output engineering units per measurement engineering unit"
+    PERCENT_PER_PV = "percent of output per measurement engineering unit"
+    TIME = "a time"
+    TIME_PER_REPEAT = "a time per repeat"
+    REPEATS_PER_TIME = "repeats per time"
+    PER_TIME = "a rate (1/time)"
+
+
+class Role(StrEnum):
+    """What a setting sets."""
+
+    GAIN = "gain"
+    MULTIPLIER = "multiplier"
+    INTEGRAL = "integral"
+    DERIVATIVE = "derivative"
+    FILTER_TIME = "filter-time"
+    FILTER_RATIO = "filter-ratio"
+    FILTER_GAIN = "filter-gain"
+    PROPORTIONAL_WEIGHT = "proportional-weight"
+    DERIVATIVE_WEIGHT = "derivative-weight"
+    TRACKING_TIME = "tracking-time"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit of a dial.
+
+    Attributes
+    ----------
+    name : str
+        The spelling used in cards and in print.
+    dimension : Dimension
+        What it measures.
+    factor : Fraction
+        One of this unit in seconds, 1/s or plain ratio.
+    """
+
+    name: str
+    dimension: Dimension
+    factor: Fraction = Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Spans:
+    """Widths of the signal ranges, in engineering units.
+
+    Attributes
+    ----------
+    pv, op : float
+        Span of the measurement and of the output.
+    """
+
+    pv: float = 100.0
+    op: float = 100.0
+
+    @property
+    def ratio(self) -> Fraction:
+        """Percent gain that one output unit per measurement unit amounts to [%/%]."""
+        return Fraction(self.pv) / Fraction(self.op)
+
+
+def _table() -> dict[str, Unit]:
+    seconds = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
+    units = [
+        Unit("1", Dimension.RATIO),
+        Unit("%/%", Dimension.RATIO),
+        Unit("%", Dimension.PERCENT, Fraction(1, 100)),
+        Unit("eu", Dimension.PV_UNITS),
+        Unit("eu/eu", Dimension.OP_PER_PV),
+        Unit("%/eu", Dimension.PERCENT_PER_PV),
+    ]
+    for name, size in seconds.items():
+        units += [
+            Unit(name, Dimension.TIME, size),
+            Unit(f"{name}/repeat", Dimension.TIME_PER_REPEAT, size),
+            Unit(f"repeat/{name}", Dimension.REPEATS_PER_TIME, 1 / size),
+            Unit(f"1/{name}", Dimension.PER_TIME, 1 / size),
+        ]
+    return {u.name: u for u in units}
+
+
+UNITS: Final = _table()
+"""Every unit a card may name, by its spelling."""
+
+_WORDS: Final = {
+    "ms": "ms", "msec": "ms", "millisecond": "ms", "s": "s", "sec": "s", "second": "s", "min": "min", "minute": "min",
+    "mn": "min", "h": "h", "hr": "h", "hour": "h", "repeat": "repeat", "rep": "repeat", "rpt": "repeat", "": "1",
+    "1": "1", "%": "%", "percent": "%", "eu": "eu",
+}  # fmt: skip
+_WHOLE: Final = {"rpm": "repeat/min", "psi/in": "eu/eu", "psi/inch": "eu/eu"}
+_NUMBER: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|inf(?:inity)?|nan))\s*(.*?)\s*$", re.I)
+
+_TIMELIKE: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
+_ACCEPTED: Final[dict[Role, tuple[Dimension, ...]]] = {
+    Role.GAIN: (
+        Dimension.RATIO, Dimension.PERCENT, Dimension.PV_UNITS, Dimension.OP_PER_PV, Dimension.PERCENT_PER_PV,
+    ),
+    Role.INTEGRAL: _TIMELIKE,
+    Role.DERIVATIVE: (Dimension.TIME,),
+    Role.FILTER_TIME: (Dimension.TIME,),
+    Role.TRACKING_TIME: (Dimension.TIME,),
+}  # fmt: skip
+_PLAIN: Final = (Dimension.RATIO, Dimension.PERCENT)
+_INVERTED: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
+
+
+def parse_unit(text: str) -> Unit:
+    """Return the unit a person wrote: ``"rep/min"``, ``"minutes per repeat"``, ``"sec"``, ``"%"``.
+
+    Raises
+    ------
+    UnitError
+        The unit is not known; the message suggests the nearest one.
+    """
+    spelled = re.sub(r"\s+per\s+", "/", text.strip().lower()).replace(" ", "")
+    whole = _WHOLE.get(spelled)
+    if whole is None:
+        parts = [_WORDS.get(p, _WORDS.get(p.removesuffix("s"))) for p in spelled.split("/")]
+        whole = "/".join(p or "?" for p in parts)
+    unit = UNITS.get(whole)
+    if unit is None:
+        raise UnitError(f"unknown unit '{text.strip()}'{suggest(spelled, UNITS)}; known units: {', '.join(UNITS)}")
+    return unit
+
+
+def parse_quantity(text: str) -> tuple[float, Unit | None]:
+    """Split ``"20 s/repeat"`` into its number and its unit (``None`` where no unit is written).
+
+    Raises
+    ------
+    UnitError
+        There is no number, a decimal comma is used, or the unit is not known.
+    """
+    match = _NUMBER.match(text)
+    if match is None:
+        raise UnitError(f"'{text}' is not a number, nor a number with a unit such as \"20 s/repeat\"")
+    number, unit = match.groups()
+    if unit.startswith(","):
+        raise UnitError(f"'{text}' has a comma; write a decimal point")
+    return float(number), parse_unit(unit) if unit else None
+
+
+def _exact(value: float) -> Fraction:
+    return Fraction(value)
+
+
+def _finite_to_canonical(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
+    if role is Role.GAIN:
+        match unit.dimension:
+            case Dimension.PERCENT:
+                return 100 / x
+            case Dimension.PV_UNITS:
+                return _exact(spans.pv) / x
+            case Dimension.OP_PER_PV:
+                return x * spans.ratio
+            case Dimension.PERCENT_PER_PV:
+                return x * _exact(spans.pv) / 100
+            case _:
+                return x
+    if role is Role.INTEGRAL and unit.dimension in _INVERTED:
+        return 1 / (x * unit.factor)
+    return x * unit.factor
+
+
+def _finite_from_canonical(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
+    if role is Role.GAIN:
+        match unit.dimension:
+            case Dimension.PERCENT:
+                return 100 / x
+            case Dimension.PV_UNITS:
+                return _exact(spans.pv) / x
+            case Dimension.OP_PER_PV:
+                return x / spans.ratio
+            case Dimension.PERCENT_PER_PV:
+                return x * 100 / _exact(spans.pv)
+            case _:
+                return x
+    if role is Role.INTEGRAL and unit.dimension in _INVERTED:
+        return 1 / (x * unit.factor)
+    return x / unit.factor
+
+
+def is_reciprocal(role: Role, unit: Unit) -> bool:
+    """Tell whether a larger dial value means a smaller canonical one (proportional band, integral time)."""
+    if role is Role.GAIN:
+        return unit.dimension in (Dimension.PERCENT, Dimension.PV_UNITS)
+    return role is Role.INTEGRAL and unit.dimension in _INVERTED
+
+
+def check_unit(role: Role, unit: Unit) -> None:
+    """Refuse a unit that cannot measure what the dial sets.
+
+    Raises
+    ------
+    UnitError
+        The unit's dimension does not fit the role.
+    """
+    accepted = _ACCEPTED.get(role, _PLAIN)
+    if unit.dimension not in accepted:
+        names = [u.name for u in UNITS.values() if u.dimension in accepted and not u.name.startswith(("ms", "h"))]
+        raise UnitError(
+            f"'{unit.name}' is {unit.dimension.value} and cannot set {role.value.replace('-', ' ')}; "
+            f"use one of: {', '.join(n for n in names if '/ms' not in n and not n.endswith('/h'))}"
+        )
+
+
+def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+    """Return the canonical value of a dial (specs/equations.md, section 1).
+
+    Parameters
+    ----------
+    role : Role
+        What the dial sets.
+    value : float
+        The dial's value, in `unit`.
+    unit : Unit
+        The dial's unit.
+    spans : Spans
+        Spans of measurement and output [engineering units], used by gains in engineering units only.
+
+    Returns
+    -------
+    float
+        Gain [%/%], reset rate [1/s], time [s] or ratio [-].
+
+    Raises
+    ------
+    UnitError
+        The unit does not fit the role, or the value is not a number.
+
+    Examples
+    --------
+    >>> to_canonical(Role.GAIN, 20, UNITS["%"])  # Honeywell UDC2800 manual p. 77: PB 20 % is gain 5
+    5.0
+    >>> to_canonical(Role.INTEGRAL, 15, UNITS["s/repeat"]) == 1 / 15
+    True
+    """
+    return _convert(role, value, unit, spans, inward=True)
+
+
+def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+    """Return the dial value, in `unit`, of a canonical one; the inverse of `to_canonical`.
+
+    Examples
+    --------
+    >>> from_canonical(Role.INTEGRAL, 1 / 15, UNITS["repeat/min"])
+    4.0
+    >>> from_canonical(Role.INTEGRAL, 0.0, UNITS["s/repeat"])
+    inf
+    """
+    return _convert(role, value, unit, spans, inward=False)
+
+
+def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
+    check_unit(role, unit)
+    if math.isnan(value):
+        raise UnitError("not a number (NaN)")
+    inverted = is_reciprocal(role, unit)
+    if math.isinf(value):
+        return math.copysign(0.0 if inverted else math.inf, value)
+    if value == 0 and inverted:
+        return math.inf
+    convert = _finite_to_canonical if inward else _finite_from_canonical
+    try:
+        return float(convert(role, _exact(value), unit, spans))
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+    """Express a dial value in another unit, rounding once.
+
+    Examples
+    --------
+    >>> convert_unit(Role.INTEGRAL, 4, UNITS["repeat/min"], UNITS["s/repeat"])
+    15.0
+    """
+    if not math.isfinite(value) or (value == 0 and is_reciprocal(role, old)):
+        return from_canonical(role, to_canonical(role, value, old, spans), new, spans)
+    check_unit(role, old)
+    check_unit(role, new)
+    canonical = _finite_to_canonical(role, _exact(value), old, spans)
+    if canonical == 0 and is_reciprocal(role, new):
+        return math.inf
+    try:
+        return float(_finite_from_canonical(role, canonical, new, spans))
+    except OverflowError:
+        return math.copysign(math.inf, value)
