@@ -1,0 +1,221 @@
+"""Blocks: the pieces a scan program is put together from, one function per equation of specs/equations.md.
+
+A block gets the `Builder` and the expressions it works on, adds its coefficients, states and assignments, and returns its result.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pidemu.card.models import Rule
+from pidemu.scan.program import Assign, Expr, Name, Operand, Program, Quantity, equal, expr, select
+
+TINY: Final = 1e-300
+"""States smaller than this are set to zero: denormal numbers make a scan many times slower (specs/equations.md, section 7)."""
+
+INPUTS: Final = (
+    Quantity("sp", "setpoint", "%"),
+    Quantity("pv", "measurement", "%"),
+    Quantity("auto", "automatic (1) or manual (0)", "-"),
+    Quantity("manual", "output set by the operator; NaN: hold", "%"),
+)
+
+
+class Builder:
+    """Collects a program's parts in order."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self._coefficients: dict[str, tuple[Quantity, float]] = {}
+        self._states: dict[str, tuple[Quantity, float]] = {}
+        self._body: list[Assign] = []
+
+    def coefficient(self, name: str, value: float, text: str, unit: str) -> Name:
+        """Add a number fixed by the settings."""
+        self._coefficients[name] = (Quantity(name, text, unit), value)
+        return Name(name)
+
+    def state(self, name: str, text: str, unit: str = "%", initial: float = 0.0) -> Name:
+        """Add something kept from scan to scan."""
+        self._states.setdefault(name, (Quantity(name, text, unit), initial))
+        return Name(name)
+
+    def let(self, name: str, value: Operand, text: str) -> Name:
+        """Add an assignment."""
+        self._body.append(Assign(name, expr(value), text))
+        return Name(name)
+
+    def program(self) -> Program:
+        """Return the finished program."""
+        return Program(
+            title=self.title,
+            inputs=INPUTS,
+            coefficients=tuple(q for q, _ in self._coefficients.values()),
+            values=tuple(v for _, v in self._coefficients.values()),
+            states=tuple(q for q, _ in self._states.values()),
+            initial=tuple(v for _, v in self._states.values()),
+            body=tuple(self._body),
+        )
+
+
+def flushed(x: Expr) -> Expr:
+    """Return `x`, or zero where it is denormally small (section 7); NaN stays NaN."""
+    return select((x > -TINY) & (x < TINY), 0.0, x)
+
+
+def limited(x: Expr, low: Expr, high: Expr) -> Expr:
+    """Return `x` within ``[low, high]`` (section 5)."""
+    return select(x > high, high, select(x < low, low, x))
+
+
+def lag(b: Builder, x: Expr, afresh: Expr, Tf: float, h: float, rule: Rule, order: int, what: str) -> Name:
+    """First- or second-order lag of a signal (sections 2 and 4); `afresh`: start in the steady state of `x`.
+
+    The order is the card's. The second-order one is ``1/(1 + Tf s + Tf^2 s^2/2)``.
+    """
+    first = b.state(f"{what}1", f"{what}, filtered, at the last scan", "%")
+    inputs = _input_weights(rule, Tf, h, order)
+    poles = _pole_weights(rule, Tf, h, order)
+    second = b.state(f"{what}2", f"{what}, filtered, two scans ago", "%") if order == 2 else None
+    text = f"filter on the {what}, Tf = {Tf:.6g} s, {rule.value} (section 4)"
+    needs_input = len(inputs) > 1 and any(inputs[1:])
+    x1 = b.state(f"{what}_in1", f"{what}, unfiltered, at the last scan", "%") if needs_input else None
+    x2 = b.state(f"{what}_in2", f"{what}, unfiltered, two scans ago", "%") if needs_input and order == 2 else None
+    history = [(first, x), (second, x), (x1, x), (x2, x)]
+    for state, value in history:
+        if state is not None:
+            b.let(state.id, select(afresh, value, state), "start in the steady state of the first sample")
+    total: Expr | None = None
+    for name, weight, signal in [
+        (f"{what}_g0", inputs[0], x),
+        (f"{what}_g1", inputs[1] if len(inputs) > 1 else 0.0, x1),
+        (f"{what}_g2", inputs[2] if len(inputs) > 2 else 0.0, x2),
+        (f"{what}_a1", poles[0], first),
+        (f"{what}_a2", poles[1] if len(poles) > 1 else 0.0, second),
+    ]:
+        if signal is None or weight == 0:
+            continue
+        part = b.coefficient(name, weight, f"weight in the filter on the {what}", "-") * signal
+        total = part if total is None else total + part
+    assert total is not None
+    result = b.let(f"{what}_f", flushed_sum(b, total, f"{what}_f"), text)
+    if second is not None:
+        b.let(second.id, first, "shift the filter's history")
+    b.let(first.id, result, "shift the filter's history")
+    if x2 is not None and x1 is not None:
+        b.let(x2.id, x1, "shift the filter's history")
+    if x1 is not None:
+        b.let(x1.id, x, "shift the filter's history")
+    return result
+
+
+def flushed_sum(b: Builder, total: Expr, name: str) -> Expr:
+    """Name a sum, so that it is computed once, and flush it."""
+    return flushed(b.let(name, total, "weighted sum"))
+
+
+def _bilinear(rule: Rule, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """``s`` as a quotient of polynomials in ``q = z^-1`` (section 4)."""
+    match rule:
+        case Rule.BACKWARD:
+            return (1.0, -1.0), (h, 0.0)
+        case Rule.FORWARD:
+            return (1.0, -1.0), (0.0, h)
+        case Rule.TRAPEZOIDAL:
+            return (2.0, -2.0), (h, h)
+
+
+def _denominator(rule: Rule, Tf: float, h: float, order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    (n0, n1), (d0, d1) = _bilinear(rule, h)
+    if order == 1:
+        return (d0, d1), (d0 + Tf * n0, d1 + Tf * n1)
+    half = Tf * Tf / 2
+    top = (d0 * d0, 2 * d0 * d1, d1 * d1)
+    bottom = (
+        d0 * d0 + Tf * n0 * d0 + half * n0 * n0,
+        2 * d0 * d1 + Tf * (n0 * d1 + n1 * d0) + 2 * half * n0 * n1,
+        d1 * d1 + Tf * n1 * d1 + half * n1 * n1,
+    )
+    return top, bottom
+
+
+def _input_weights(rule: Rule, Tf: float, h: float, order: int) -> tuple[float, ...]:
+    top, bottom = _denominator(rule, Tf, h, order)
+    return tuple(x / bottom[0] for x in top)
+
+
+def _pole_weights(rule: Rule, Tf: float, h: float, order: int) -> tuple[float, ...]:
+    _, bottom = _denominator(rule, Tf, h, order)
+    return tuple(-x / bottom[0] for x in bottom[1:])
+
+
+def derivative(b: Builder, x: Expr, afresh: Expr, gain: float, Tf: float, h: float, rule: Rule) -> Name:
+    """Return the derivative term, filtered with `Tf` (section 4); without filter the backward difference.
+
+    Parameters
+    ----------
+    b : Builder
+        The program under construction.
+    x : Expr
+        The signal, ``c r - y``.
+    afresh : Expr
+        Where true, start with no derivative.
+    gain : float
+        ``kd``.
+    Tf, h : float
+        Filter time and scan interval [s].
+    rule : Rule
+        Scan rule.
+    """
+    x1 = b.state("x1", "signal of the derivative at the last scan")
+    b.let("x1", select(afresh, x, x1), "no derivative of the step from nothing to the first sample")
+    if not Tf:
+        g = b.coefficient("kd_h", gain / h, "kd/h", "-")
+        d = b.let("D", g * (x - x1), "derivative, backward difference (section 4)")
+        b.let("x1", x, "kept for the next scan")
+        return d
+    match rule:
+        case Rule.BACKWARD:
+            decay, g = Tf / (Tf + h), gain / (Tf + h)
+        case Rule.FORWARD:
+            decay, g = 1 - h / Tf, gain / Tf
+        case Rule.TRAPEZOIDAL:
+            decay, g = (2 * Tf - h) / (2 * Tf + h), 2 * gain / (2 * Tf + h)
+    state = b.state("D", "derivative term")
+    a = b.coefficient("D_decay", decay, "decay of the filtered derivative per scan", "-")
+    k = b.coefficient("D_gain", g, "kd over the filter's time", "-")
+    old = select(afresh, 0.0, state)
+    b.let("D", a * old + k * (x - x1), f"derivative, Tf = {Tf:.6g} s, {rule.value} (section 4)")
+    b.let("D", flushed(state), "no denormal numbers (section 7)")
+    b.let("x1", x, "kept for the next scan")
+    return state
+
+
+def increment(b: Builder, w: Expr, afresh: Expr, ki: float, h: float, rule: Rule) -> Expr:
+    """Return what the integral of `w` grows by in this scan (section 4).
+
+    With the forward rule this is the growth *after* the output of this scan, so a positional program adds it there.
+    """
+    if rule is not Rule.TRAPEZOIDAL:
+        return b.coefficient("ki_h", ki * h, "ki h", "-") * w
+    w1 = b.state("w1", "signal of the integral at the last scan")
+    half = b.coefficient("ki_h2", ki * h / 2, "ki h/2", "-")
+    b.let("w1", select(afresh, w, w1), "no step from nothing to the first sample")
+    grown = b.let("dI", half * (w + w1), "increment of the integral, trapezoidal (section 4)")
+    b.let("w1", w, "kept for the next scan")
+    return grown
+
+
+def saturated(v: Expr, low: Expr, high: Expr, grows: Expr) -> Expr:
+    """Return whether the sum is beyond a limit and the integral's increment pushes it further (section 5, conditional)."""
+    return ((v > high) & (grows > 0.0)) | ((v < low) & (grows < 0.0))
+
+
+def at_limit(u: Expr, low: Expr, high: Expr) -> Expr:
+    """Return whether an output stands at a limit (section 5, freeze)."""
+    return (u >= high) | (u <= low)
+
+
+def held(manual: Expr, u: Expr) -> Expr:
+    """Return the operator's output, or the last output where the operator has set nothing (NaN)."""
+    return select(equal(manual, manual), manual, u)

@@ -1,0 +1,262 @@
+"""An algorithm, a scan interval and limits to a scan program.
+
+Order within a scan (specs/equations.md, section 4): read, filter, terms, sum, limits, then what is done after the output.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.models import Rule
+from pidemu.errors import ScanError
+from pidemu.scan import blocks
+from pidemu.scan.blocks import Builder, select
+from pidemu.scan.program import Expr, Name, Program, equal
+
+Action = Literal["reverse", "direct"]
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """The expressions that both implementations start from."""
+
+    P: Expr
+    D: Expr | None
+    y: Expr
+    w: Expr
+    low: Name
+    high: Name
+    u: Name
+    on: Expr
+    fresh: Expr
+
+
+def build(
+    algorithm: Algorithm,
+    scan: float,
+    *,
+    action: Action = "reverse",
+    limits: tuple[float, float] = (0.0, 100.0),
+    bias: float = 0.0,
+    initial_output: float = 0.0,
+    title: str = "PID",
+) -> Program:
+    """Return the scan program of an algorithm.
+
+    Parameters
+    ----------
+    algorithm : Algorithm
+        What to run, reverse acting.
+    scan : float
+        Scan interval [s].
+    action : {"reverse", "direct"}
+        Control action: with ``"direct"`` the output rises when the measurement rises.
+    limits : tuple of float
+        Output limits [%, or the card's output units].
+    bias : float
+        Output at zero error of a positional controller without integral [as limits].
+    initial_output : float
+        Output before the first scan [as limits].
+    title : str
+        The program's title.
+
+    Raises
+    ------
+    ScanError
+        The scan interval, the limits or the bias cannot be used, or the combination is not defined.
+    """
+    _check(algorithm, scan, limits, bias)
+    sign = 1.0 if action == "reverse" else -1.0
+    a = replace(algorithm, kp=sign * algorithm.kp, ki=sign * algorithm.ki, kd=sign * algorithm.kd)
+    b = Builder(title)
+    terms = _terms(b, a, scan, limits, initial_output)
+    output = _velocity(b, a, scan, terms) if a.velocity else _positional(b, a, scan, terms, bias)
+    manual = b.let("man", blocks.held(Name("manual"), terms.u), "the operator's output; held where none is set (section 6)")
+    b.let("u", select(Name("auto") > 0.0, output, manual), "output")
+    b.let("on", select(Name("auto") > 0.0, 1.0, 0.0), "mode, kept for the next scan")
+    if not a.restarted:
+        b.let("begun", 1.0, "there has been a scan")
+    return b.program()
+
+
+def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float) -> None:
+    if not (math.isfinite(h) and h > 0):
+        raise ScanError(f"scan interval {h:g} s is not a positive number")
+    low, high = limits
+    if not low < high:
+        raise ScanError(f"output limits {low:g} to {high:g} are no range; give low, then high")
+    if bias and (a.ki or a.velocity):
+        raise ScanError("a bias belongs to a positional controller without integral action; leave it out")
+    if a.windup == "external-reset" and a.integral_rule is Rule.TRAPEZOIDAL and a.ki:
+        raise ScanError("external-reset windup is defined for the backward and forward rules only")
+    for rule, Tf in [(a.derivative_rule, a.Tf if a.has_term_filter else 0), (a.filter_rule, a.Tf if a.has_signal_filter else 0)]:
+        if rule is Rule.FORWARD and 0 < Tf <= h / 2:
+            raise ScanError(
+                f"the filter time {Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
+                f"use a scan interval below {2 * Tf:g} s or no filter"
+            )
+
+
+def _terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initial_output: float) -> Terms:
+    """Filter the measurement and compute P, D and the signal that the integral acts on (sections 2 and 4)."""
+    low = b.coefficient("low", limits[0], "low output limit", "%")
+    high = b.coefficient("high", limits[1], "high output limit", "%")
+    u = b.state("u", "last output", "%", min(max(initial_output, limits[0]), limits[1]))
+    on = b.state("on", "automatic in the last scan", "-")
+    was_auto = on > 0.0
+    fresh = equal(on, 0.0) if a.restarted else equal(b.state("begun", "there has been a scan", "-"), 0.0)
+    sp, y = Name("sp"), Name("pv")
+    if a.has_signal_filter and a.filter_on == "measurement":
+        y = blocks.lag(b, y, fresh, a.Tf, h, a.filter_rule, a.filter_order, "pv")
+    e = b.let("e", sp - y, "error")
+    P: Expr = b.let("P", _weighted(b, a.kp, "kp", a.b, "b", e, sp, y), "proportional term") if a.kp else _zero(b)
+    D = None
+    if a.kd:
+        x = b.let("x", _difference(b, a.c, "c", e, sp, y), "signal of the derivative")
+        D = blocks.derivative(b, x, fresh, a.kd, a.Tf if a.has_term_filter else 0.0, h, a.derivative_rule)
+    w: Expr = e
+    if a.series and D is not None and a.ki:
+        per_gain = b.coefficient("per_kp", 1 / a.kp, "1/kp", "-")
+        w = b.let("w", e + per_gain * D, "signal of the integral: series form (section 2)")
+    return Terms(P, D, y, w, low, high, u, was_auto, fresh)
+
+
+def _zero(b: Builder) -> Expr:
+    return b.let("P", 0.0, "no proportional term")
+
+
+def _difference(b: Builder, weight: float, name: str, e: Expr, sp: Expr, y: Expr) -> Expr:
+    """Return ``weight*sp - y`` in as few operations as the weight allows."""
+    if weight == 1:
+        return e
+    if weight == 0:
+        return 0.0 - y
+    return b.coefficient(name, weight, "setpoint weight", "-") * sp - y
+
+
+def _weighted(b: Builder, gain: float, gain_name: str, weight: float, name: str, e: Expr, sp: Expr, y: Expr) -> Expr:
+    k = b.coefficient(gain_name, gain, "proportional gain, signed for action", "%/%")
+    return k * _difference(b, weight, name, e, sp, y)
+
+
+def _sum(parts: list[Expr | None]) -> Expr:
+    total: Expr | None = None
+    for part in parts:
+        if part is not None:
+            total = part if total is None else total + part
+    assert total is not None
+    return total
+
+
+def _positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Expr:
+    """Sum the terms; the integral is a state (sections 4 to 6)."""
+    P: Expr = t.P
+    moved: Expr | None = None
+    if a.accumulated and a.kp and a.b == 0:
+        P, moved = _accumulated(b, a, t)
+    holds_sum = bool(a.ki) or a.load_output
+    I: Expr | None = None  # noqa: E741 (the field's symbol)
+    grown: Expr | None = None
+    if holds_sum:
+        state = b.state("I", "integral sum")
+        grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral_rule) if a.ki else None
+        grown = _gated(b, a, t, P, state, grown)
+        I = _start_and_grow(b, a, t, P, state, grown, moved)  # noqa: E741
+    elif bias:
+        I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
+    v: Expr = b.let("v", _sum([P, I, t.D]), "sum of the terms")
+    if a.has_signal_filter and a.filter_on == "output":
+        v = blocks.lag(b, v, equal(b.state("on", "automatic in the last scan", "-"), 0.0), a.Tf, h, a.filter_rule, a.filter_order, "v")
+    out = b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")
+    if holds_sum and a.ki:
+        _after_output(b, a, h, v, out, grown)
+    return out
+
+
+def _accumulated(b: Builder, a: Algorithm, t: Terms) -> tuple[Expr, Expr | None]:
+    """P on PV, accumulated from its value at the start: into the integral sum, or on its own (section 5, clamp-sum)."""
+    y1 = b.state("y1", "measurement at the last scan")
+    b.let("y1", select(t.fresh, t.y, y1), "no step from nothing to the first sample")
+    moved = b.let("dP", Name("kp") * (t.y - y1), "what the proportional term moves by")
+    b.let("y1", t.y, "kept for the next scan")
+    if a.windup == "clamp-sum":
+        return b.let("P", 0.0, "the proportional term is in the integral sum"), moved
+    own = b.state("P_sum", "accumulated proportional term")
+    return b.let("P_sum", select(t.fresh, 0.0, own) - moved, "proportional term on PV, accumulated"), None
+
+
+def _gated(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr | None) -> Expr | None:
+    """Stop the integral at a limit where the scheme says so (section 5)."""
+    if grown is None or a.windup not in ("freeze", "conditional"):
+        return grown
+    grown = b.let("dI", grown, "increment of the integral")
+    if a.windup == "freeze":
+        stop = blocks.at_limit(t.u, t.low, t.high)
+        return b.let("dI", select(stop, 0.0, grown), "freeze: none while the last output is at a limit (section 5)")
+    ahead = [P, state, None if a.integral_rule is Rule.FORWARD else grown, t.D]
+    v0 = b.let("v0", _sum(ahead), "sum with this increment")
+    stop = blocks.saturated(v0, t.low, t.high, grown)
+    return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")
+
+
+def _start_and_grow(
+    b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr | None, moved: Expr | None
+) -> Expr:
+    """Set the integral at a transfer, let it grow otherwise (section 6)."""
+    now = None if a.integral_rule is Rule.FORWARD else grown
+    if a.load_output:
+        total = select(t.on, state, t.u)
+        total = total if now is None else total + now
+        total = total if moved is None else total - moved
+        b.let("I", total, "integral; at a transfer loaded with the last output (section 6)")
+    else:
+        start = _sum([t.u - P, None]) if t.D is None else t.u - P - t.D
+        grow = state if now is None else state + now
+        grow = grow if moved is None else grow - moved
+        b.let("I", select(t.on, grow, start), "integral; at a transfer u - P - D, bumpless (section 6)")
+    if a.windup in ("clamp", "clamp-sum"):
+        b.let("I", blocks.limited(state, t.low, t.high), f"{a.windup}: the sum within the output limits (section 5)")
+    return state
+
+
+def _after_output(b: Builder, a: Algorithm, h: float, v: Expr, out: Expr, grown: Expr | None) -> None:
+    """Do what is done to the integral after the output (section 5)."""
+    state = Name("I")
+    if a.windup in ("back-calculation", "external-reset"):
+        Tt = a.tracking_time
+        share = h / (Tt + h) if a.windup == "external-reset" and a.integral_rule is Rule.BACKWARD else h / Tt
+        back = b.coefficient("back", share, "share of the cut-off taken out of the integral per scan", "-")
+        b.let("I", state + back * (out - v), f"{a.windup}, Tt = {Tt:.6g} s (section 5)")
+    if a.integral_rule is Rule.FORWARD and grown is not None:
+        b.let("I", state + grown, "integral, after the output: forward (section 4)")
+    if a.windup in ("back-calculation", "external-reset"):
+        b.let("I", blocks.flushed(state), "no denormal numbers (section 7)")
+
+
+def _velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
+    """Add the increments of the terms to the last limited output (section 4)."""
+    parts: list[Expr | None] = []
+    if a.kp:
+        P1 = b.state("P1", "proportional term at the last scan")
+        parts.append(b.let("dP", t.P - P1, "increment of the proportional term"))
+        b.let("P1", t.P, "kept for the next scan")
+    if a.ki:
+        grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral_rule)
+        if a.integral_rule is Rule.FORWARD:
+            late = b.state("dI1", "increment of the integral of the last scan")
+            parts.append(b.let("dI", late, "increment of the integral, one scan late: forward (section 4)"))
+            b.let("dI1", grown, "kept for the next scan")
+        else:
+            parts.append(grown)
+    if t.D is not None:
+        D1 = b.state("D1", "derivative term at the last scan")
+        parts.append(b.let("dD", t.D - D1, "increment of the derivative term"))
+        b.let("D1", t.D, "kept for the next scan")
+    du: Expr = b.let("du", select(t.on, _sum(parts), 0.0), "increment; none at a transfer, bumpless (section 6)")
+    if a.has_signal_filter and a.filter_on == "output":
+        du = blocks.lag(b, du, equal(b.state("on", "automatic in the last scan", "-"), 0.0), a.Tf, h, a.filter_rule, a.filter_order, "du")
+    v = b.let("v", t.u + du, "last output and increment")
+    return b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")

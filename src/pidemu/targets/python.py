@@ -1,0 +1,131 @@
+"""A scan program as Python source: the reference that every other back end must equal bit by bit."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from types import CodeType
+from typing import Any, Final
+
+from pidemu.scan.program import Binary, Expr, Name, Number, Program, Select
+
+_PRECEDENCE: Final = {
+    "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
+}  # fmt: skip
+_SELECT: Final = 0
+_ATOM: Final = 9
+
+
+def render(x: Expr) -> str:
+    """Return an expression as Python."""
+    return _render(x)[0]
+
+
+def _literal(value: float) -> str:
+    return repr(value) if math.isfinite(value) else f'float("{value!r}")'
+
+
+def _render(x: Expr) -> tuple[str, int]:
+    match x:
+        case Number(value=value):
+            return _literal(value), _ATOM if value >= 0 else 7
+        case Name(id=name):
+            return name, _ATOM
+        case Select(condition=condition, yes=yes, no=no):
+            test, then = (_wrapped(part, 1) for part in (condition, yes))
+            return f"{then} if {test} else {_wrapped(no, _SELECT)}", _SELECT
+        case Binary(operator=operator, left=left, right=right):
+            level = _PRECEDENCE[operator]
+            strict = level + 1 if level != 2 and level != 1 else level
+            return f"{_wrapped(left, level)} {operator} {_wrapped(right, strict)}", level
+    raise TypeError(f"no Python for {type(x).__name__}")
+
+
+def _wrapped(x: Expr, least: int) -> str:
+    text, level = _render(x)
+    return text if level >= least else f"({text})"
+
+
+def _body(program: Program, indent: str) -> list[str]:
+    lines = []
+    for assign in program.body:
+        code = f"{indent}{assign.name} = {render(assign.value)}"
+        lines.append(f"{code:<64}  # {assign.text}")
+    return lines
+
+
+def source(program: Program) -> str:
+    """Return a module that runs the program: its coefficients, `scan` for one scan and `run` for many.
+
+    Parameters
+    ----------
+    program : Program
+        What to print.
+    """
+    arguments = ", ".join(q.name for q in program.inputs)
+    states = ", ".join(q.name for q in program.states)
+    lines = [f'"""{program.title}"""', ""]
+    for quantity, value in zip(program.coefficients, program.values, strict=True):
+        lines.append(f"{quantity.name} = {_literal(value):<24}  # {quantity.text} [{quantity.unit}]")
+    lines += ["", "# kept from scan to scan"]
+    for quantity, value in zip(program.states, program.initial, strict=True):
+        lines.append(f"#   {quantity.name:<12} {quantity.text} [{quantity.unit}]")
+    lines += [
+        f"INITIAL = [{', '.join(_literal(v) for v in program.initial)}]",
+        "",
+        "",
+        f"def scan(state, {arguments}):",
+        '    """Do one scan; change `state` and return the output."""',
+        f"    {states} = state",
+        *_body(program, "    "),
+        f"    state[:] = {states}",
+        f"    return {program.output}",
+        "",
+        "",
+        f"def run(state, {', '.join(f'{q.name}_n' for q in program.inputs)}):",
+        '    """Do one scan per sample of the signals; change `state` and return the outputs."""',
+        f"    {states} = state",
+        "    outputs = []",
+        f"    for {arguments} in zip({', '.join(f'{q.name}_n' for q in program.inputs)}, strict=True):",
+        *_body(program, "        "),
+        f"        outputs.append({program.output})",
+        f"    state[:] = {states}",
+        "    return outputs",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A program as Python functions.
+
+    Attributes
+    ----------
+    scan : callable
+        ``scan(state, sp, pv, auto, manual) -> u``.
+    run : callable
+        ``run(state, sp, pv, auto, manual) -> list of u``, over sequences.
+    """
+
+    scan: Callable[[list[float], float, float, float, float], float]
+    run: Callable[[list[float], Sequence[float], Sequence[float], Sequence[float], Sequence[float]], list[float]]
+
+
+@lru_cache(maxsize=256)
+def _code(text: str) -> CodeType:
+    return compile(text, "<scan program>", "exec")
+
+
+def compiled(program: Program) -> Compiled:
+    """Return the program as Python functions.
+
+    The functions' text does not hold the coefficients, so loops that share a structure share the compiled code.
+    """
+    names: dict[str, Any] = {}
+    functions = re.sub(r"\A.*?(?=^def scan)", "", source(program), flags=re.DOTALL | re.MULTILINE)
+    exec(_code(re.sub(r"  +# .*", "", functions)), names)  # our own text: nothing of the user's goes into it
+    names.update((q.name, v) for q, v in zip(program.coefficients, program.values, strict=True))
+    return Compiled(names["scan"], names["run"])
