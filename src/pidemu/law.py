@@ -278,14 +278,26 @@ class Law:
         ValueError
             The law is discrete.
         """
+        m0, m1, m2 = self.expansion(3, path)
+        return m0, m1, m2
+
+    def expansion(self, terms: int, path: PathName = "feedback") -> tuple[float, ...]:
+        """Return the first `terms` coefficients of ``s C(s)`` in powers of ``s``; the first three are the moments.
+
+        Raises
+        ------
+        ValueError
+            The law is discrete.
+        """
         self._continuous()
         r = self.path(path)
         num, den = (r.num, r.den[1:]) if r.den[0] == 0 else ((0.0, *r.num), r.den)
-        n = [x / den[0] for x in (*num, 0.0, 0.0, 0.0)[:3]]
-        d1, d2 = (*(x / den[0] for x in den[1:]), 0.0, 0.0)[:2]
-        m0 = n[0]
-        m1 = n[1] - d1 * m0
-        return m0, m1, n[2] - d1 * m1 - d2 * m0
+        out: list[float] = []
+        for k in range(terms):
+            value = num[k] if k < len(num) else 0.0
+            value -= sum(den[j] * out[k - j] for j in range(1, min(k + 1, len(den))))
+            out.append(value / den[0])
+        return tuple(out)
 
     def kick(self) -> float:
         """Return the output step that a unit setpoint step makes at once [%/%]; infinite for an unfiltered derivative on error.

@@ -234,6 +234,9 @@ class Setting(Model):
     )
     range: tuple[Number, Number] | None = Field(default=None, description="Smallest and largest value, in `unit`; off values may lie outside.")
     off: Number | list[Number] | None = Field(default=None, description="Value, or values, that switch the term off; the first is used in conversions.")
+    scope: Literal["loop", "module"] = Field(
+        default="loop", description="`module`: a setting that many loops share; conversions leave it at its default unless told otherwise."
+    )
     resolution: Annotated[float, Field(gt=0)] | None = Field(default=None, description="Smallest step of the dial, in `unit`.")
 
 

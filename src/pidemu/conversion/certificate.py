@@ -1,0 +1,261 @@
+"""The certificate of a conversion: what stays the same, what does not, and by how much (specs/equations.md, section 9)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.law import Law, PathName, Response
+
+Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
+
+EXACT: Final = 1e-9
+"""Largest relative deviation that counts as none: rounding, many times over."""
+
+_POINTS: Final = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """How far two controllers differ over a band of frequencies.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the band [rad/s].
+    max_deviation : float
+        ``max |Ct/Cs - 1|``.
+    gain_db, phase_deg : float
+        Largest difference of gain [dB] and phase [deg], whatever its sign.
+    worst_at : float
+        Frequency of the largest deviation [rad/s].
+    """
+
+    low: float
+    high: float
+    max_deviation: float
+    gain_db: float
+    phase_deg: float
+    worst_at: float
+
+
+@dataclass(frozen=True, slots=True)
+class PathComparison:
+    """One signal path of both controllers, compared.
+
+    Attributes
+    ----------
+    loop_band : Band
+        Where usual tuning puts the crossover.
+    full_band : Band
+        On to the highest frequencies, which noise will see.
+    """
+
+    loop_band: Band
+    full_band: Band
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there is no difference beyond rounding."""
+        return max(self.loop_band.max_deviation, self.full_band.max_deviation) < EXACT
+
+
+@dataclass(frozen=True, slots=True)
+class Kick:
+    """What a unit setpoint step does to the output at once [%/%].
+
+    Attributes
+    ----------
+    source, target : float
+        The two kicks; infinite for an unfiltered derivative on the error.
+    """
+
+    source: float
+    target: float
+
+    @property
+    def ratio(self) -> float:
+        """Target's kick per source's; 1 where both are alike, also zero or infinite."""
+        if self.source == self.target:
+            return 1.0
+        if math.isinf(self.source):
+            return 0.0
+        return self.target / self.source if self.source else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Rounded:
+    """A dial rounded to the target's resolution.
+
+    Attributes
+    ----------
+    name : str
+        The dial.
+    exact, rounded : float
+        Its value before and after [the dial's unit].
+    """
+
+    name: str
+    exact: float
+    rounded: float
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """All figures of a conversion.
+
+    Attributes
+    ----------
+    feedback, setpoint : PathComparison
+        The continuous laws.
+    feedback_at_scan, setpoint_at_scan : PathComparison or None
+        The discrete laws at the two scan intervals, where these were given.
+    setpoint_kick : Kick
+        The setpoint kicks of the continuous laws.
+    time_scale : float
+        The source's effective integral time, which places the loop band [s].
+    dials : tuple of Rounded
+        What rounding to the target's resolution did.
+    feedback_before_rounding : PathComparison or None
+        The feedback path with the dials not rounded, where they were.
+    """
+
+    feedback: PathComparison
+    setpoint: PathComparison
+    feedback_at_scan: PathComparison | None
+    setpoint_at_scan: PathComparison | None
+    setpoint_kick: Kick
+    time_scale: float
+    dials: tuple[Rounded, ...] = ()
+    feedback_before_rounding: PathComparison | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """``exact``, ``exact-feedback`` or ``approximate``."""
+        feedback = [c for c in (self.feedback, self.feedback_at_scan) if c is not None]
+        setpoint = [c for c in (self.setpoint, self.setpoint_at_scan) if c is not None]
+        if not all(c.is_exact for c in feedback):
+            return "approximate"
+        return "exact" if all(c.is_exact for c in setpoint) else "exact-feedback"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""
+        plain: dict[str, Any] = json_safe(asdict(self))
+        plain["setpoint_kick"]["ratio"] = json_safe(self.setpoint_kick.ratio)
+        return plain
+
+
+def json_safe(value: Any) -> Any:
+    """Return nested plain values with infinities and NaN as strings, which JSON cannot hold as numbers."""
+    if isinstance(value, dict):
+        return {k: json_safe(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_safe(v) for v in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def time_scale(law: Law) -> float:
+    """Return the effective integral time ``m1/m0`` that places the loop band [s] (section 9).
+
+    Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the integral gain,
+    and for proportional action alone, which has no time scale, one second.
+    """
+    m0, m1, m2 = law.moments()
+    if m0:
+        return abs(m1 / m0) if m1 / m0 > 0 else 1 / abs(m0)
+    return abs(m2 / m1) if m1 and m2 else 1.0
+
+
+def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return loop band and full band of a source [rad/s] (section 9).
+
+    Parameters
+    ----------
+    law : Law
+        The source's continuous law.
+    scan : float or None
+        The longer scan interval [s], whose Nyquist frequency ends both bands.
+    """
+    Ti = time_scale(law)
+    m0, m1, m2 = law.moments()
+    Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
+    nyquist = math.pi / scan if scan is not None else math.inf
+    low = 0.01 / Ti
+    loop = max(min(5 / Ti, nyquist), low * 1.01)
+    return (low, loop), (low, max(min(100 / Td, nyquist), loop))
+
+
+def compare(source: Response, target: Response, w: npt.NDArray[np.float64]) -> Band:
+    """Compare two responses at frequencies `w` [rad/s]."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratio = target / source
+        both_zero = (source == 0) & (target == 0)
+        ratio[both_zero] = 1.0
+        deviation = np.abs(ratio - 1)
+        deviation[np.isnan(deviation)] = np.inf
+        gain = np.abs(20 * np.log10(np.abs(ratio)))
+        phase = np.abs(np.degrees(np.angle(ratio)))
+    worst = int(np.argmax(deviation))
+    return Band(
+        float(w[0]), float(w[-1]), float(deviation[worst]), float(np.nanmax(gain)), float(np.nanmax(np.nan_to_num(phase))), float(w[worst])
+    )
+
+
+def compare_paths(
+    source: Law, target: Law, path: PathName, limits: tuple[tuple[float, float], tuple[float, float]], factor: float
+) -> PathComparison:
+    """Compare one path of two laws over loop band and full band.
+
+    Parameters
+    ----------
+    source, target : Law
+        Both continuous, or each discrete at its own scan interval.
+    path : {"feedback", "setpoint"}
+        Which path.
+    limits : tuple
+        Loop band and full band [rad/s].
+    factor : float
+        What the source's gain is multiplied by for new signal ranges.
+    """
+    found = []
+    for low, high in limits:
+        w = np.geomspace(low, high, _POINTS)
+        found.append(compare(factor * source.response(w, path), target.response(w, path), w))
+    return PathComparison(*found)
+
+
+def certify(
+    source: Law,
+    target: Law,
+    at_scan: tuple[Law, Law] | None,
+    factor: float = 1.0,
+) -> Certificate:
+    """Return the certificate of two controllers.
+
+    Parameters
+    ----------
+    source, target : Law
+        The continuous laws.
+    at_scan : tuple of Law or None
+        The discrete laws of source and target at their scan intervals.
+    factor : float
+        What the source's gain is multiplied by for new signal ranges.
+    """
+    scans = [law.scan for law in at_scan or () if law.scan is not None]
+    limits = bands(source, max(scans) if scans else None)
+    discrete = [compare_paths(*at_scan, path, limits, factor) for path in _PATHS] if at_scan else [None, None]
+    return Certificate(
+        feedback=compare_paths(source, target, "feedback", limits, factor),
+        setpoint=compare_paths(source, target, "setpoint", limits, factor),
+        feedback_at_scan=discrete[0],
+        setpoint_at_scan=discrete[1],
+        setpoint_kick=Kick(factor * source.kick(), target.kick()),
+        time_scale=time_scale(source),
+    )
+
+
+_PATHS: Final[tuple[PathName, PathName]] = ("feedback", "setpoint")

@@ -1,0 +1,366 @@
+"""Converting settings from one card to another, with the certificate that says how near they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+from pidemu.card.library import load_card
+from pidemu.card.load import Card
+from pidemu.conversion import match as closed
+from pidemu.conversion.advice import warnings_for
+from pidemu.conversion.certificate import Certificate, Rounded, Verdict, certify, json_safe
+from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.nearest import nearest
+from pidemu.conversion.target import Numbers, Target, TargetFilter
+from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
+from pidemu.law import Law, Rational, law_of
+from pidemu.settings import Settings
+from pidemu.units import Role
+
+Match = Literal["exact", "low-frequency", "textbook", "constrained"]
+MATCHES: Final = ("exact", "low-frequency", "textbook")
+"""Matches a user may ask for; by default exact where possible, else low-frequency."""
+
+
+@dataclass(frozen=True)
+class Textbook:
+    """What the rule in manuals would have given, shown beside the default.
+
+    Attributes
+    ----------
+    settings : Settings or None
+        The settings; ``None`` where the rule has no answer or the target refuses it.
+    certificate : Certificate or None
+        Its figures.
+    reason : str
+        Why there is no answer.
+    """
+
+    settings: Settings | None
+    certificate: Certificate | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Settings of a target that stand for those of a source.
+
+    Attributes
+    ----------
+    source, settings : Settings
+        The source's and the target's settings.
+    match : str
+        How they were found: exact, low-frequency, textbook or constrained.
+    certificate : Certificate
+        How near they are.
+    textbook : Textbook
+        What the textbook rule would have given.
+    warnings : tuple of str
+        What the target does differently, in words.
+    refusal : str
+        Why the target refused, where these are only the nearest settings.
+    factor : float
+        What the source's gain was multiplied by for new signal ranges.
+    scan : tuple of float or None
+        Scan intervals of source and target [s].
+    """
+
+    source: Settings
+    settings: Settings
+    match: Match
+    certificate: Certificate
+    textbook: Textbook
+    warnings: tuple[str, ...]
+    refusal: str = ""
+    factor: float = 1.0
+    scan: tuple[float, float] | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """``exact``, ``exact-feedback`` or ``approximate``."""
+        return self.certificate.verdict
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What the result rests on without anybody having said so: fields of both cards that are only assumed."""
+        return tuple(
+            f"{s.card.id}: {a.path} = {a.value}" + (f" ({a.evidence.note})" if a.evidence and a.evidence.note else "")
+            for s in (self.source, self.settings)
+            for a in s.variant.assumptions()
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values, the form of ``pidemu convert --json``."""
+        plain = {
+            "from": _plain(self.source),
+            "to": _plain(self.settings),
+            "match": self.match,
+            "verdict": self.verdict,
+            "certificate": self.certificate.to_dict(),
+            "textbook": {
+                "to": _plain(self.textbook.settings) if self.textbook.settings else None,
+                "certificate": self.textbook.certificate.to_dict() if self.textbook.certificate else None,
+                "reason": self.textbook.reason,
+            },
+            "scan": list(self.scan) if self.scan else None,
+            "gain_factor": self.factor,
+            "warnings": list(self.warnings),
+            "notes": [*self.source.notes, *self.settings.notes],
+            "assumptions": list(self.assumptions),
+        }
+        safe: dict[str, Any] = json_safe(plain)
+        return safe
+
+
+def _plain(s: Settings) -> dict[str, Any]:
+    return {
+        "card": s.card.id,
+        "settings": {n: {"value": v.value, "unit": v.unit} for n, v in s.items() if v.active},
+        "options": dict(s.options),
+    }
+
+
+def convert(
+    source: Settings,
+    target: str | Card,
+    *,
+    options: Mapping[str, object] | None = None,
+    given: Mapping[str, object] | None = None,
+    scan: float | tuple[float, float] | None = None,
+    match: str | None = None,
+    allow_approximate: bool = False,
+    pv_range: tuple[float, float] | None = None,
+    op_range: tuple[float, float] | None = None,
+    round_dials: bool = False,
+) -> Conversion:
+    """Convert settings to another card.
+
+    Parameters
+    ----------
+    source : Settings
+        The settings.
+    target : str or Card
+        The card to convert to, or its id.
+    options : mapping, optional
+        Options of the target; those not named take the card's defaults.
+    given : mapping, optional
+        Dials of the target that shall have these values, such as a filter factor or a setpoint weight.
+    scan : float or tuple of float, optional
+        Scan interval of both, or of source and target [s]: adds the discrete laws to the certificate and to the verdict.
+    match : {"exact", "low-frequency", "textbook"}, optional
+        How to match; by default exact where the target's filter can be set so, else low-frequency.
+    allow_approximate : bool
+        Where the target refuses, return the nearest settings instead of raising.
+    pv_range, op_range : tuple of float, optional
+        Signal ranges of the target [engineering units]; by default the source's. Where they differ, gains are rescaled for
+        the same effect in engineering units.
+    round_dials : bool
+        Round the dials to the target's resolution; the certificate states the effect.
+
+    Returns
+    -------
+    Conversion
+        The target's settings, the certificate and what to watch for.
+
+    Raises
+    ------
+    ConversionRefusedError
+        The target cannot do what the source does; the error holds the nearest settings and what they would cost.
+    SettingError, CardError
+        The target, an option or a given dial is unknown, or a range of the source is missing.
+
+    Examples
+    --------
+    >>> import pidemu
+    >>> s = pidemu.load_card("generic/series").settings(K=2, Ti=15, Td=5)
+    >>> conv = pidemu.convert(s, "generic/standard")
+    >>> conv.verdict, round(conv.settings["K"].value, 4), conv.settings["Ti"].value, conv.settings["Td"].value
+    ('exact', 2.6667, 20.0, 3.75)
+    """
+    if match is not None and match not in MATCHES:
+        raise PidemuError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
+    card = load_card(target) if isinstance(target, str) else target
+    factor = _rescaling(source, pv_range, op_range)
+    scans = (float(scan), float(scan)) if isinstance(scan, int | float) else scan
+    goal = Target(card, options or {}, given or {}, pv_range or source.pv_range, op_range or source.op_range)
+    work = _Work(source, goal, factor, scans)
+    settings, how, refusal = work.solve(match)
+    if settings is None:
+        raise ConversionRefusedError(refusal)
+    conversion = work.finish(settings, how, refusal, round_dials=round_dials)
+    if refusal and not allow_approximate:
+        raise ConversionRefusedError(refusal, conversion)
+    return conversion
+
+
+def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float, float] | None) -> float:
+    """Return the factor on the percent gain for new ranges (specs/equations.md, section 3, rescaling)."""
+    factor = 1.0
+    for name, new, old, power in (("pv_range", pv, source.pv_range, 1), ("op_range", op, source.op_range, -1)):
+        if new is not None and old is None and new != (0.0, 100.0):
+            raise SettingError(f"{source.card.id}: the target's {name} is given, the source's is not; give both")
+        if new is not None and old is not None:
+            factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
+    return factor
+
+
+def _scaled(law: Law, factor: float) -> Law:
+    if factor == 1:
+        return law
+    return replace(law, feedback=law.feedback * Rational((factor,)), setpoint=law.setpoint * Rational((factor,)))
+
+
+class _Work:
+    """One conversion under way."""
+
+    def __init__(self, source: Settings, target: Target, factor: float, scans: tuple[float, float] | None) -> None:
+        self.source = source
+        self.target = target
+        self.factor = factor
+        self.scans = scans
+        self.algorithm = source.algorithm()
+        self.law = law_of(self.algorithm)
+        self.scaled = _scaled(self.law, factor)
+        self.at_source_scan = law_of(self.algorithm, scans[0]) if scans else None
+
+    def solve(self, match: str | None) -> tuple[Settings | None, Match, str]:
+        """Return the target's settings, how they were found, and why they are only the nearest ones."""
+        try:
+            closed.check_terms(self.algorithm, self.target)
+            if match == "textbook":
+                return self._textbook_settings(), "textbook", ""
+            return (*self._closed(match), "")
+        except (NoMatchError, SettingError) as error:
+            reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
+        numbers = nearest(self.law, self.algorithm, self.target, self.factor)
+        if numbers is None:
+            return None, "constrained", f"{reason}; no settings of it come near"
+        try:
+            return self._weighted(numbers), "constrained", reason
+        except SettingError as error:
+            return None, "constrained", f"{reason}; no settings of it come near: {error}"
+
+    def _closed(self, match: str | None) -> tuple[Settings, Match]:
+        filt = self.target.filter
+        if filt.free and match != "low-frequency":
+            try:
+                return self._weighted(closed.exact(self.scaled, self.target)), "exact"
+            except (NoMatchError, SettingError):
+                if match == "exact":
+                    raise
+        settings = self._low_frequency()
+        how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
+        if match == "exact" and how != "exact":
+            raise NoMatchError("its filter is fixed, and no settings give the same law")
+        return settings, how
+
+    def _low_frequency(self) -> Settings:
+        """Match the moments, with a free filter set as near as its range allows to the source's."""
+        filt = self.target.filter
+        fixed = replace(filt, free=False)
+        if filt.free:
+            Tf, base = self._wanted_filter()
+            fixed = filt.nearest_to(Tf, base)
+        self.target.__dict__["filter"] = fixed
+        first, *others = closed.low_frequency(self.scaled, self.target, fixed)
+        for numbers in others:  # the root with Ti < Td only where it is the source itself
+            with suppress(SettingError):
+                settings = self._with_filter(numbers, fixed)
+                if self._certify(settings).feedback.is_exact:
+                    return settings
+        return self._with_filter(first, fixed)
+
+    def _with_filter(self, numbers: Numbers, fixed: TargetFilter) -> Settings:
+        """Return settings with a filter that was free set to the value it was fixed at."""
+        if fixed.setting is not None and fixed.setting not in self.target.given:
+            numbers = replace(numbers, Tf=self._time_of(fixed, numbers))
+        return self._weighted(numbers)
+
+    def _time_of(self, filt: TargetFilter, numbers: Numbers) -> float:
+        if filt.kind == "time":
+            return float(filt.value)
+        Td = numbers.kd / (numbers.K if numbers.K and self.target.form != "parallel" else 1.0)
+        base = Td / (1 + Td * numbers.ki / numbers.K) if filt.effective and numbers.K else Td
+        return float(filt.ratio * base)
+
+    def _wanted_filter(self) -> tuple[float, float]:
+        """Return the filter time that the next moment asks for, and the derivative time it goes with [s]."""
+        _, m1, m2, m3 = self.scaled.expansion(4)
+        if m2 == 0:
+            return 0.0, 0.0
+        base = m2 / m1 if m1 and self.target.form != "parallel" else m2
+        return max(0.0, -m3 / m2), base
+
+    def _textbook_settings(self) -> Settings:
+        time = self.source.by_role(Role.DERIVATIVE)
+        a = self.algorithm
+        per = 1.0 if self.source.equation.form == "parallel" else a.kp
+        dial_kd = per * time.canonical if time is not None and a.kd and self.source.equation.form != "parallel" else a.kd
+        scaled = replace(a, kp=a.kp * self.factor, ki=a.ki * self.factor, kd=a.kd * self.factor)
+        return self.target.settings(closed.textbook(scaled, dial_kd * self.factor, self.target))
+
+    def _weighted(self, numbers: Numbers) -> Settings:
+        """Return settings with the setpoint weights that keep the setpoint path, as far as their ranges allow."""
+        settings = self.target.settings(numbers)
+        b, c = closed.weights(self.scaled, self.target, settings.algorithm())
+        if b is None and c is None:
+            return settings
+        return self.target.settings(replace(numbers, b=self._in_range(Role.PROPORTIONAL_WEIGHT, b), c=self._in_range(Role.DERIVATIVE_WEIGHT, c)))
+
+    def _in_range(self, role: Role, weight: float | None) -> float | None:
+        dial = self.target.dial(role)
+        if dial is None or weight is None:
+            return None
+        low, high = dial[1].range or (0.0, 1.0)
+        return min(max(weight, low), high)
+
+    def _certify(self, settings: Settings) -> Certificate:
+        at_scan = None
+        if self.scans and self.at_source_scan:
+            at_scan = (self.at_source_scan, settings.law(self.scans[1]))
+        return certify(self.law, settings.law(), at_scan, self.factor)
+
+    def textbook(self) -> Textbook:
+        """Return what the textbook rule would have given."""
+        try:
+            closed.check_terms(self.algorithm, self.target)
+            settings = self._textbook_settings()
+            return Textbook(settings, self._certify(settings))
+        except (NoMatchError, SettingError) as error:
+            return Textbook(None, None, str(error))
+
+    def finish(self, settings: Settings, how: Match, refusal: str, *, round_dials: bool) -> Conversion:
+        """Certify, round if asked, and say what differs."""
+        certificate = self._certify(settings)
+        if round_dials:
+            rounded, dials = _rounded(settings)
+            before = certificate.feedback
+            certificate = replace(self._certify(rounded), dials=dials, feedback_before_rounding=before if dials else None)
+            settings = rounded
+        conversion = Conversion(
+            self.source, settings, how, certificate, self.textbook(), (), refusal, self.factor, self.scans
+        )
+        return replace(conversion, warnings=tuple(warnings_for(conversion)))
+
+
+def _rounded(settings: Settings) -> tuple[Settings, tuple[Rounded, ...]]:
+    """Round every dial that has a resolution."""
+    dials = []
+    values: dict[str, object] = {}
+    for name, value in settings.items():
+        step = value.setting.resolution
+        new = value.value
+        if step is not None and value.active and not value.off:
+            new = round(value.value / step) * step
+            low, high = value.setting.range or (0.0, float("inf"))
+            new = float(f"{min(max(new, low), high):.12g}")
+            if new != value.value:
+                dials.append(Rounded(name, value.value, new))
+        values[name] = new
+    ranges = {k: v for k, v in (("pv_range", settings.pv_range), ("op_range", settings.op_range)) if v is not None}
+    return settings.card.settings({**settings.options, **values, **ranges}), tuple(dials)
+
+

@@ -1,0 +1,248 @@
+"""Closed forms: the numbers of a target that match a source (specs/equations.md, section 3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.models import Form
+from pidemu.conversion.target import Numbers, Target, TargetFilter
+from pidemu.law import Law
+from pidemu.units import Role
+
+
+class NoMatchError(Exception):
+    """A closed form has no solution; the message is the reason, for the user."""
+
+
+_ROUNDING = 1e-12
+"""Relative size below which a difference of two products is their rounding."""
+
+
+def check_terms(source: Algorithm, target: Target) -> None:
+    """Refuse a source with a term that the target does not have.
+
+    Raises
+    ------
+    NoMatchError
+        The target lacks integral, derivative or proportional action, or cannot be without proportional action.
+    """
+    have = f"{target.card.id}{_chosen(target)}"
+    if source.ki and not target.has_integral:
+        raise NoMatchError(f"the source has integral action, {have} has none")
+    if source.kd and not target.has_derivative:
+        raise NoMatchError(f"the source has derivative action, {have} has none")
+    if source.kp and not target.has_proportional:
+        raise NoMatchError(f"the source has proportional action, {have} has none")
+    if not source.kp and target.has_proportional and target.form is not Form.PARALLEL:
+        raise NoMatchError(f"the source has no proportional action; the {target.form.value} form of {have} cannot be without it")
+
+
+def _chosen(target: Target) -> str:
+    chosen = ", ".join(f"{o}={c}" for o, c in target.variant.chosen.items())
+    return f" ({chosen})" if chosen else ""
+
+
+def exact(law: Law, target: Target) -> Numbers:
+    """Return the numbers for which all coefficients of the feedback path agree; the target's filter must be free.
+
+    Raises
+    ------
+    NoMatchError
+        There are none.
+    """
+    n0, n1, n2, d1, d2 = law.coefficients()
+    shape, filt = target.shape, target.filter
+    if not filt.free:
+        raise NoMatchError("the target's filter is fixed")
+    if not target.has_proportional:
+        raise NoMatchError("the target has no proportional term")
+    wanted_d2 = d1 * d1 / 2 if shape.filter_order == 2 and shape.filter_on == "measurement" else 0.0
+    if abs(d2 - wanted_d2) > _ROUNDING * max(d1 * d1, abs(d2)):
+        raise NoMatchError("the two filters are of different order")
+    if shape.filter_on != "term":
+        return _through_signal_filter(n0, n1, n2, d1, target)
+    if shape.series:
+        return _exact_series(n0, n1, n2, d1, filt)
+    kp = n1 - n0 * d1
+    return Numbers(kp, n0, _clean(n2 - kp * d1, n2), d1)
+
+
+def _clean(difference: float, scale: float) -> float:
+    return 0.0 if abs(difference) <= _ROUNDING * abs(scale) else difference
+
+
+def _exact_series(n0: float, n1: float, n2: float, d1: float, filt: TargetFilter) -> Numbers:
+    """Factor the numerator; the larger root is the integral time."""
+    root = n1 * n1 - 4 * n0 * n2
+    if root < -_ROUNDING * n1 * n1:
+        raise NoMatchError(_complex_zeros(n0, n1, n2))
+    lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
+    K = n1 - n0 * lead
+    time = lead if filt.lead_lag else lead - d1
+    if time < 0:
+        raise NoMatchError(f"its filter, {d1:.6g} s, is longer than the derivative time {lead:.6g} s of the equivalent series form")
+    return Numbers(K, n0, K * _clean(time, lead), d1)
+
+
+def _complex_zeros(n0: float, n1: float, n2: float) -> str:
+    ratio = n1 * n1 / (n0 * n2)
+    return (
+        "the source has complex zeros: as a standard form its integral time is "
+        f"{ratio:.4g} times its derivative time, and a series form needs 4 times or more"
+    )
+
+
+def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: Target) -> Numbers:
+    """Return the numbers for a target whose filter multiplies the whole feedback path, of ``n0 + n1 s + n2 s^2`` before it."""
+    if target.form is not Form.SERIES:
+        return Numbers(n1, n0, n2, Tf if target.filter.free else None)
+    root = n1 * n1 - 4 * n0 * n2
+    if root < -_ROUNDING * n1 * n1:
+        raise NoMatchError(_complex_zeros(n0, n1, n2))
+    lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
+    K = n1 - n0 * lead
+    return Numbers(K, n0, K * lead, Tf if target.filter.free else None)
+
+
+def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers, ...]:
+    """Return the numbers for which the moments ``m0, m1, m2`` of the feedback path agree, the filter being fixed.
+
+    A series form has two such solutions; the one with ``Ti >= Td`` comes first.
+
+    Parameters
+    ----------
+    law : Law
+        The source's law.
+    target : Target
+        The target.
+    filt : TargetFilter
+        The target's filter, with the value it shall have.
+
+    Raises
+    ------
+    NoMatchError
+        There are none.
+    """
+    m0, m1, m2 = law.moments()
+    m2 = _clean(m2, abs(m1 * m1 / m0) if m0 else abs(m2))
+    if not target.has_proportional:
+        return (_without_proportional(m0, m2, target),)
+    if not target.has_derivative:
+        return (Numbers(m1, m0, 0.0),)
+    if target.shape.filter_on != "term" and filt.kind != "none":
+        return (_behind_filter(m0, m1, m2, target, filt),)
+    if target.form is not Form.SERIES:
+        return (Numbers(m1, m0, m2),)
+    return tuple(_series_roots(m0, m1, m2, filt))
+
+
+def _series_roots(m0: float, m1: float, m2: float, filt: TargetFilter) -> Iterator[Numbers]:
+    """Solve for the derivative strength of a series form, both roots."""
+    # D: strength of the derivative term in seconds; the filter's time is sigma D + tau
+    shrink = 1 - filt.ratio if filt.lead_lag else 1.0
+    if shrink <= 0:
+        raise NoMatchError(f"its lead-lag filter ratio {filt.ratio:g} leaves no lead")
+    sigma, tau = filt.ratio / shrink, filt.time
+    linear, square = m1 - m0 * tau, m0 * (1 + sigma)
+    root = linear * linear - 4 * square * m2
+    if root < -_ROUNDING * linear * linear:
+        raise NoMatchError(
+            f"the source, with moments m1^2/(m0 m2) = {m1 * m1 / (m0 * m2):.4g}, has no equivalent in this series form, "
+            f"which needs {4 * (1 + sigma):.4g} or more"
+        )
+    sum_ = linear + math.copysign(math.sqrt(max(root, 0.0)), linear)
+    for D in (2 * m2 / sum_ if m2 else 0.0, sum_ / (2 * square) if m2 and square else None):
+        if D is not None:
+            K = m1 - m0 * D
+            yield Numbers(K, m0, K * (D / shrink + (tau if filt.lead_lag and D else 0.0)))
+
+
+def _without_proportional(m0: float, m2: float, target: Target) -> Numbers:
+    if target.form is Form.PARALLEL:
+        return Numbers(0.0, m0, m2)
+    return Numbers(math.copysign(1.0, m0 or m2), m0, m2)  # the gain only scales the two times: take 1
+
+
+def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: TargetFilter) -> Numbers:
+    """Match the moments of a target whose filter multiplies the whole feedback path."""
+    second = 0.5 if target.shape.filter_order == 2 else 1.0
+    if filt.kind == "time":
+        Tf = filt.time
+        return _through_signal_filter(m0, m1 + m0 * Tf, m2 + m1 * Tf + m0 * Tf * Tf * (1 - second), Tf, target)
+    if target.form is Form.PARALLEL or (target.form is Form.SERIES and not filt.effective):
+        raise NoMatchError("there is no closed form for this filter")
+    rho = filt.ratio
+    # Tf = rho Td:  m0 rho (1 - (1 - second) rho) Td^2 + m1 (1 - rho) Td - m2 = 0
+    square, linear = m0 * rho * (1 - (1 - second) * rho), m1 * (1 - rho)
+    root = linear * linear + 4 * square * m2
+    if root < 0 or (linear == 0 and square == 0):
+        raise NoMatchError("its filter is too long for the source's derivative")
+    Td = 2 * m2 / (linear + math.copysign(math.sqrt(root), linear or 1.0)) if m2 else 0.0
+    K = m1 + m0 * rho * Td
+    return replace(_through_signal_filter(m0, K, K * Td, rho * Td, target), Tf=None)
+
+
+def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
+    """Return what manuals print: filters ignored (specs/equations.md, section 3, textbook match).
+
+    Parameters
+    ----------
+    source : Algorithm
+        The source.
+    dial_kd : float
+        ``K Td`` by the source's derivative dial [s].
+    target : Target
+        The target.
+
+    Raises
+    ------
+    NoMatchError
+        The rule has no answer.
+    """
+    kp, ki, kd = source.kp, source.ki, dial_kd
+    if source.series and kd:
+        kp = source.kp * (1 + (kd / source.kp) * (ki / source.kp))
+    if not target.has_proportional:
+        return _without_proportional(ki, kd, target)
+    if target.form is not Form.SERIES or not kd:
+        return Numbers(kp, ki, kd)
+    root = kp * kp - 4 * ki * kd
+    if root < -_ROUNDING * kp * kp:
+        raise NoMatchError("the textbook rule needs an integral time of 4 times the derivative time or more")
+    lead = 2 * kd / (kp + math.copysign(math.sqrt(max(root, 0.0)), kp))
+    K = kp - ki * lead
+    return Numbers(K, ki, K * lead)
+
+
+def weights(law: Law, target: Target, feedback: Algorithm) -> tuple[float | None, float | None]:
+    """Return the free setpoint weights b and c for which the setpoint paths' moments agree (specs/equations.md, section 2).
+
+    Parameters
+    ----------
+    law : Law
+        The source's law.
+    target : Target
+        The target.
+    feedback : Algorithm
+        The target's algorithm with its feedback path matched.
+    """
+    m0, m1, m2 = law.moments("setpoint")
+    a = feedback
+    if a.filter_on == "output" and a.Tf:
+        m1, m2 = m1 + a.Tf * m0, m2 + a.Tf * m1
+    per_gain = a.ki / a.kp if a.kp else 0.0
+    shrink = 1 - a.Tf * per_gain if a.series and a.filter_on == "term" else 1.0
+    c = m2 / (a.kd * shrink) if a.kd and shrink else None
+    c_free, b_free = target.weight_is_free(Role.DERIVATIVE_WEIGHT), target.weight_is_free(Role.PROPORTIONAL_WEIGHT)
+    held = (c if c is not None else 0.0) if c_free else a.c
+    b = (m1 - (held * a.kd * per_gain if a.series else 0.0)) / a.kp if a.kp else None
+    return _snapped(b) if b_free else None, _snapped(c) if c_free else None
+
+
+def _snapped(weight: float | None) -> float | None:
+    if weight is None:
+        return None
+    return float(round(weight)) if abs(weight - round(weight)) < 1e-9 else weight

@@ -1,0 +1,283 @@
+"""What is free to choose on a target card, and how canonical numbers become its settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.load import Card, Variant
+from pidemu.card.models import Form, Setting
+from pidemu.errors import SettingError
+from pidemu.settings import Settings, is_active, limits, off_values
+from pidemu.units import Role, Spans, from_canonical, parse_unit, to_canonical
+
+FilterKind = Literal["none", "time", "ratio", "gain"]
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The numbers of a target's own form, in canonical units.
+
+    Attributes
+    ----------
+    K : float
+        Gain [%/%].
+    ki : float
+        Integral gain, ``K/Ti`` in the standard and series forms [1/s].
+    kd : float
+        ``K Td`` with Td the derivative dial, or the parallel form's derivative gain [s].
+    Tf : float or None
+        Filter time [s], where the target's filter is free; ``None``: as the target fixes it.
+    b, c : float or None
+        Setpoint weights, where the target's are free.
+    """
+
+    K: float
+    ki: float
+    kd: float
+    Tf: float | None = None
+    b: float | None = None
+    c: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TargetFilter:
+    """The filter that goes with a target's derivative.
+
+    Attributes
+    ----------
+    kind : str
+        How the card states it.
+    setting : str or None
+        The dial that sets it.
+    free : bool
+        Whether the conversion may choose it.
+    value : float
+        Its present value: time [s], ratio or gain.
+    lead_lag : bool
+        Whether it is the lag of a lead-lag.
+    effective : bool
+        Whether ratio or gain refer to ``Ti Td/(Ti + Td)``.
+    low, high : float
+        Allowed values, in the dial's own terms made canonical.
+    """
+
+    kind: FilterKind = "none"
+    setting: str | None = None
+    free: bool = False
+    value: float = 0.0
+    lead_lag: bool = False
+    effective: bool = False
+    low: float = 0.0
+    high: float = math.inf
+
+    @property
+    def ratio(self) -> float:
+        """``Tf`` per derivative time; 0 where the filter is none or a fixed time."""
+        if self.kind == "ratio":
+            return self.value
+        return 1 / self.value if self.kind == "gain" and self.value else 0.0
+
+    @property
+    def time(self) -> float:
+        """``Tf`` [s] of a filter stated as a time; otherwise 0."""
+        return self.value if self.kind == "time" else 0.0
+
+    def nearest_to(self, Tf: float, base: float) -> TargetFilter:
+        """Return the filter fixed at the allowed value nearest to `Tf` [s]; `base` is the derivative time it refers to [s]."""
+        if self.kind == "time":
+            wanted = Tf
+        elif self.kind == "ratio":
+            wanted = Tf / base if base > 0 else self.value
+        elif self.kind == "gain":
+            wanted = base / Tf if Tf > 0 else self.high if math.isfinite(self.high) else self.value
+        else:
+            return self
+        return replace(self, free=False, value=min(max(wanted, self.low), self.high))
+
+
+class Target:
+    """A card to convert to, with its options chosen and some dials perhaps given.
+
+    Parameters
+    ----------
+    card : Card
+        The card.
+    options : mapping
+        Options by name.
+    given : mapping
+        Dials that the user has fixed.
+    pv_range, op_range : tuple of float, optional
+        Signal ranges.
+    """
+
+    def __init__(
+        self,
+        card: Card,
+        options: Mapping[str, object],
+        given: Mapping[str, object],
+        pv_range: tuple[float, float] | None,
+        op_range: tuple[float, float] | None,
+    ) -> None:
+        self.card = card
+        self.variant: Variant = card.variant(options)
+        self.given = dict(given)
+        self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
+        self.spans = Spans(*(r[1] - r[0] if r else 100.0 for r in (pv_range, op_range)))
+        self.form = self.variant.equation.form
+        self._check_given()
+
+    def _check_given(self) -> None:
+        known = {n.casefold(): n for n in self.variant.equation.settings}
+        self.given = {known.get(n.casefold(), n): v for n, v in self.given.items()}
+        for name in self.given:
+            if name not in self.variant.equation.settings:
+                self.template(**{name: self.given[name]})  # says what is wrong with the name
+            elif Role(self.variant.equation.settings[name].sets) in (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE):
+                raise SettingError(f"{self.card.id}: {name} is what the conversion computes; it cannot be given")
+
+    def dial(self, role: Role) -> tuple[str, Setting] | None:
+        """Return the active dial that sets `role`."""
+        for name, setting in self.variant.equation.settings.items():
+            if setting.sets == role.value and is_active(self.variant.equation, name, setting):
+                return name, setting
+        return None
+
+    def is_free(self, name: str, setting: Setting) -> bool:
+        """Whether the conversion may choose a dial."""
+        return name not in self.given and setting.scope == "loop"
+
+    def weight_is_free(self, role: Role) -> bool:
+        """Whether the conversion may choose a setpoint weight."""
+        dial = self.dial(role)
+        return dial is not None and self.is_free(*dial)
+
+    @cached_property
+    def has_proportional(self) -> bool:
+        """Whether there is a proportional term on the measurement."""
+        return self.variant.equation.proportional.on != "none"
+
+    @cached_property
+    def has_integral(self) -> bool:
+        """Whether there is an integral term."""
+        return self.variant.equation.integral.on != "none" and self.dial(Role.INTEGRAL) is not None
+
+    @cached_property
+    def has_derivative(self) -> bool:
+        """Whether there is a derivative term."""
+        return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
+
+    @cached_property
+    def filter(self) -> TargetFilter:
+        """The filter and whether it is free."""
+        filt = self.variant.equation.derivative.filter
+        if filt is None:
+            return TargetFilter()
+        kind: FilterKind = "ratio" if filt.ratio is not None else "gain" if filt.gain is not None else "time"
+        given = filt.ratio if kind == "ratio" else filt.gain if kind == "gain" else filt.time
+        shape = {"lead_lag": filt.applies_to == "lead-lag", "effective": filt.of == "effective-derivative"}
+        if not isinstance(given, str):
+            return TargetFilter(kind, None, False, float(given or 0.0), **shape)
+        setting = self.variant.equation.settings[given]
+        role, unit = Role(setting.sets), parse_unit(setting.unit)
+        low, high = (to_canonical(role, x, unit) for x in limits(setting))
+        present = self.template()[given].canonical
+        return TargetFilter(kind, given, self.is_free(given, setting), present, low=low, high=high, **shape)
+
+    @cached_property
+    def shape(self) -> Algorithm:
+        """The target's algorithm with placeholder numbers, for everything but its numbers."""
+        return self.template().algorithm()
+
+    def template(self, **extra: object) -> Settings:
+        """Return settings with placeholder numbers in the dials that a conversion computes."""
+        values: dict[str, object] = {**self.given, **extra}
+        for name, setting in self.variant.equation.settings.items():
+            if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
+                values[name] = _placeholder(setting)
+        return self.card.settings({**self.variant.chosen, **values, **self.ranges})
+
+    def settings(self, n: Numbers) -> Settings:
+        """Return the target's settings for canonical numbers.
+
+        Raises
+        ------
+        SettingError
+            A dial would leave its range, or a term that cannot be switched off would have to be.
+        """
+        return self.card.settings({**self.variant.chosen, **self.given, **self._dials(n), **self.ranges})
+
+    def _dials(self, n: Numbers) -> dict[str, float]:
+        parallel = self.form is Form.PARALLEL
+        scale = self._multiplier()
+        engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        per_gain = 1 / n.K if n.K and not parallel else 0.0
+        rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
+        time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
+        wanted = [(Role.GAIN, n.K / scale), (Role.INTEGRAL, rate), (Role.DERIVATIVE, time)]
+        if n.b is not None:
+            wanted.append((Role.PROPORTIONAL_WEIGHT, n.b))
+        if n.c is not None:
+            wanted.append((Role.DERIVATIVE_WEIGHT, n.c))
+        dials = {}
+        for role, value in wanted:
+            dial = self.dial(role)
+            if dial is not None:
+                dials[dial[0]] = self._to_dial(*dial, value)
+        if n.Tf is not None and self.filter.setting is not None:
+            base = time / (1 + rate * time) if self.filter.effective else time
+            dials.update(self._filter_dial(n.Tf, base))
+        return dials
+
+    def _multiplier(self) -> float:
+        dial = self.dial(Role.MULTIPLIER)
+        return self.template()[dial[0]].canonical if dial is not None else 1.0
+
+    def _to_dial(self, name: str, setting: Setting, value: float) -> float:
+        role = Role(setting.sets)
+        off = off_values(setting)
+        if value == 0 and role in (Role.INTEGRAL, Role.DERIVATIVE):
+            if off:
+                return off[0]
+            if role is Role.INTEGRAL:
+                raise SettingError(f"{self.card.id}: {name} cannot be switched off: the card states no off value")
+        return from_canonical(role, value, parse_unit(setting.unit), self.spans)
+
+    def _filter_dial(self, Tf: float, base: float) -> dict[str, float]:
+        f = self.filter
+        assert f.setting is not None
+        setting = self.variant.equation.settings[f.setting]
+        if f.kind == "time":
+            return {f.setting: self._to_dial(f.setting, setting, Tf)}
+        if base == 0:
+            return {}
+        if f.kind == "ratio":
+            return {f.setting: Tf / base}
+        if Tf == 0:
+            raise SettingError(f"{self.card.id}: {f.setting} would have to be infinite: this target always filters its derivative")
+        return {f.setting: base / Tf}
+
+    def algorithm_at(self, K: Any, Ti: Any, Td: Any) -> Algorithm:
+        """Return the target's algorithm for arrays of gain, integral time [s] and derivative time [s], filter as fixed.
+
+        In the parallel form ``Ti = kp/ki`` and ``Td = kd/kp``.
+        """
+        f = self.filter
+        base = Td / (1 + Td / Ti) if f.effective else Td * K if self.form is Form.PARALLEL and f.kind != "time" else Td
+        Tf = f.time if f.kind == "time" else f.ratio * base / (self._multiplier() if self.form is Form.PARALLEL else 1.0)
+        kd = K * (Td - Tf) if f.lead_lag else K * Td
+        return replace(self.shape, kp=K, ki=K / Ti, kd=kd, Tf=Tf)
+
+
+def _placeholder(setting: Setting) -> float:
+    low, high = limits(setting)
+    candidate = setting.default if setting.default is not None else 1.0
+    if low <= candidate <= high and candidate not in off_values(setting) and (candidate or setting.sets == "derivative"):
+        return candidate or min(1.0, high)
+    return low if low > 0 else high if math.isfinite(high) else 1.0
+
+
