@@ -87,4 +87,5 @@ class Algorithm:
     @property
     def derivative_per_gain(self) -> float:
         """``kd/kp`` [s]: the derivative time that the integral of the series form sees."""
-        return self.kd / self.kp if self.kd else 0.0
+        none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
+        return 0.0 if none else self.kd / self.kp

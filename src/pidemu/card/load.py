@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,6 +51,18 @@ def leaves(value: Any, path: Path_ = ()) -> Iterator[Path_]:
             yield from leaves(item, (*path, key))
     else:
         yield path
+
+
+def dotted(path: Path_) -> str:
+    """Return a path as evidence writes it: ``derivative.filter.ratio``."""
+    return ".".join(map(str, path))
+
+
+def variants(card: Card) -> Iterator[Variant]:
+    """Yield a card with every combination of its options."""
+    names = list(card.options)
+    for choice in itertools.product(*(card.options[n] for n in names)):
+        yield card.variant(dict(zip(names, choice, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,12 +119,11 @@ class Variant:
         found = []
         for path in leaves(self.raw):
             home = self.home(path)
-            dotted = ".".join(map(str, home))
             key = self.card.evidence_key(home)
             value: Any = self.raw
             for step in path:
                 value = value[step]
-            found.append(Statement(".".join(map(str, path)), value, self.card.data.evidence.get(key or ""), key or dotted))
+            found.append(Statement(dotted(path), value, self.card.data.evidence.get(key or ""), key or dotted(home)))
         return found
 
     def assumptions(self) -> list[Statement]:
@@ -160,7 +172,7 @@ class Card:
     def evidence_key(self, path: Path_) -> str | None:
         """Return the longest evidence path at or above `path`."""
         for end in range(len(path), 0, -1):
-            key = ".".join(map(str, path[:end]))
+            key = dotted(path[:end])
             if key in self.data.evidence:
                 return key
         return None

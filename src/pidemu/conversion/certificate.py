@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.law import Law, PathName, Response
+from pidemu.plain import json_safe
 
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
 
@@ -147,15 +148,6 @@ class Certificate:
         plain: dict[str, Any] = json_safe(asdict(self))
         plain["setpoint_kick"]["ratio"] = json_safe(self.setpoint_kick.ratio)
         return plain
-
-
-def json_safe(value: Any) -> Any:
-    """Return nested plain values with infinities and NaN as strings, which JSON cannot hold as numbers."""
-    if isinstance(value, dict):
-        return {k: json_safe(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [json_safe(v) for v in value]
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def time_scale(law: Law) -> float:

@@ -11,12 +11,13 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion import match as closed
 from pidemu.conversion.advice import warnings_for
-from pidemu.conversion.certificate import Certificate, Rounded, Verdict, certify, json_safe
+from pidemu.conversion.certificate import Certificate, Rounded, Verdict, certify
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.nearest import nearest
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
 from pidemu.law import Law, Rational, law_of
+from pidemu.plain import json_safe
 from pidemu.settings import Settings
 from pidemu.units import Role
 
@@ -244,14 +245,18 @@ class _Work:
             return None, "constrained", f"{reason}; no settings of it come near: {error}"
 
     def _closed(self, match: str | None) -> tuple[Settings, Match]:
-        filt = self.target.filter
-        if filt.free and match != "low-frequency":
+        why: NoMatchError | SettingError | None = None
+        if self.target.filter.free and match != "low-frequency":
             try:
                 return self._weighted(closed.exact(self.scaled, self.target)), "exact"
-            except (NoMatchError, SettingError):
+            except (NoMatchError, SettingError) as error:
+                why = error
                 if match == "exact":
                     raise
-        settings = self._low_frequency()
+        try:
+            settings = self._low_frequency()
+        except (NoMatchError, SettingError) as error:
+            raise (why if isinstance(why, NoMatchError) else error) from None
         how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
         if match == "exact" and how != "exact":
             raise NoMatchError("its filter is fixed, and no settings give the same law")

@@ -203,6 +203,8 @@ def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
         The rule has no answer.
     """
     kp, ki, kd = source.kp, source.ki, dial_kd
+    if source.series and target.form is Form.SERIES and target.has_proportional:
+        return Numbers(kp, ki, kd)
     if source.series and kd:
         kp = source.kp * (1 + (kd / source.kp) * (ki / source.kp))
     if not target.has_proportional:

@@ -1,0 +1,5 @@
+"""``python -m pidemu``."""
+
+from pidemu.cli import main
+
+main()

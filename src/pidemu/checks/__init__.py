@@ -1,0 +1,45 @@
+"""Rules that a card must obey beyond its shape. What is missing fails; nothing is skipped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pidemu.card.load import Card, load_file, variants
+from pidemu.checks import equations, runs, statements
+from pidemu.errors import CardError, Problem
+
+
+def check(card: Card) -> list[Problem]:
+    """Return every breach of the rules, in the order of the file.
+
+    Parameters
+    ----------
+    card : Card
+        The card.
+    """
+    try:
+        found = {p for rule in statements.RULES for p in rule(card)}
+        found |= {p for variant in variants(card) for rule in equations.RULES for p in rule(variant)}
+        if not found:  # what is wrong in itself is not computed with
+            found |= {p for run in runs.RULES for p in run(card)}
+    except CardError as error:  # two choices, each fine by itself, do not go together
+        found = set(error.problems)
+    return sorted(found)
+
+
+def check_file(file: Path, card_id: str | None = None, shown: str | None = None) -> list[Problem]:
+    """Return everything wrong with a card file: its text, its shape and the rules.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    card_id : str, optional
+        Its id; by default from its path.
+    shown : str, optional
+        Its name in messages.
+    """
+    try:
+        return check(load_file(file, card_id, shown))
+    except CardError as error:
+        return list(error.problems)

@@ -1,0 +1,190 @@
+"""Rules on the equation that each combination of options makes: one function each, which says in one sentence why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from pidemu.card.load import Variant, dotted, variants
+from pidemu.card.models import Equation
+from pidemu.card.source import Path_
+from pidemu.errors import PidemuError, Problem, suggest
+from pidemu.settings import limits, off_values
+from pidemu.units import Dimension, Role, check_unit, parse_quantity, parse_unit
+
+_NEUTRAL: Final = {
+    "multiplier": 1.0, "proportional-weight": 1.0, "derivative-weight": 1.0, "filter-time": 0.0, "filter-ratio": 0.0, "derivative": 0.0,
+}  # fmt: skip
+
+
+def reject_bad_units(variant: Variant) -> Iterator[Problem]:
+    """A dial's unit measures what the dial sets."""
+    for name, setting in variant.equation.settings.items():
+        home = variant.home(("settings", name, "unit"))
+        try:
+            unit = parse_unit(setting.unit)
+            check_unit(Role(setting.sets), unit)
+        except PidemuError as error:
+            yield variant.card.document.problem(home, str(error))
+            continue
+        if unit.name != setting.unit:
+            yield variant.card.document.problem(home, f"write the unit '{unit.name}'")
+        if setting.sets == "gain" and variant.equation.signals == "engineering" and unit.dimension is not Dimension.OP_PER_PV:
+            yield variant.card.document.problem(home, "with 'signals: engineering' the gain's unit is 'eu/eu'")
+
+
+def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
+    """Ranges ascend, and a default lies in its range or is an off value."""
+    document = variant.card.document
+    for name, s in variant.equation.settings.items():
+        home = variant.home(("settings", name))
+        low, high = limits(s)
+        if not low < high:
+            yield document.problem((*home, "range"), f"range {low:g} to {high:g} does not ascend")
+        if s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
+            yield document.problem((*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and no off value")
+        if s.default is not None and math.isnan(s.default):
+            yield document.problem((*home, "default"), "default is not a number")
+    low, high = variant.equation.output.limits
+    if not low < high:
+        yield document.problem(variant.home(("output", "limits")), f"output limits {low:g} to {high:g} do not ascend")
+
+
+def reject_unexplained_defaults(variant: Variant) -> Iterator[Problem]:
+    """A default is the vendor's, with evidence of its own, or one that switches the term off or leaves it as it is."""
+    for name, s in variant.equation.settings.items():
+        if s.default is None or s.default in off_values(s) or s.default == _NEUTRAL.get(s.sets):
+            continue
+        home = variant.home(("settings", name, "default"))
+        key = variant.card.evidence_key(home) or ""
+        if name not in key.split("."):
+            yield variant.card.document.problem(home, f"default {s.default:g} needs evidence of its own, at '{dotted(home)}' or '{dotted(home[:-1])}'")
+
+
+def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
+    """The default scan interval is a time above zero."""
+    try:
+        number, unit = parse_quantity(variant.equation.scan.default)
+        if unit is None or unit.dimension is not Dimension.TIME or not 0 < number < math.inf:
+            raise PidemuError(f"'{variant.equation.scan.default}' is no time; write it like '1 s'")
+    except PidemuError as error:
+        yield variant.card.document.problem(variant.home(("scan", "default")), str(error))
+
+
+def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
+    """Each term has exactly one dial."""
+    equation, document = variant.equation, variant.card.document
+    roles = {
+        "gain": not (equation.form == "parallel" and equation.proportional.on == "none"),
+        "integral": equation.integral.on != "none",
+        "derivative": equation.derivative.on != "none",
+    }
+    for role, needed in roles.items():
+        dials = [n for n, s in equation.settings.items() if s.sets == role]
+        if needed and not dials:
+            yield document.problem(("settings",), f"no setting sets the {role}", at_key=True)
+        if len(dials) > 1:
+            yield document.problem(variant.home(("settings", dials[1])), f"'{dials[0]}' and '{dials[1]}' both set the {role}", at_key=True)
+
+
+def reject_bad_references(variant: Variant) -> Iterator[Problem]:
+    """A field that names a setting names one with the right role, and every such setting is named."""
+    equation, document = variant.equation, variant.card.document
+    for path, name, role in _references(equation):
+        if not isinstance(name, str) or (role == "tracking-time" and name in ("Ti", "sqrt(Ti Td)")):
+            continue
+        setting = equation.settings.get(name)
+        if setting is None:
+            yield document.problem(variant.home(path), f"no setting '{name}'{suggest(name, equation.settings)}")
+        elif setting.sets != role:
+            yield document.problem(variant.home(path), f"'{name}' sets the {setting.sets}, here a {role} is needed")
+    named = {name for _, name, _ in _references(equation)}
+    everywhere = {n for v in variants(variant.card) for _, n, _ in _references(v.equation)}
+    for name, setting in equation.settings.items():
+        needs = setting.sets not in ("gain", "multiplier", "integral", "derivative")
+        if needs and name not in named and name not in everywhere:
+            yield document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
+
+
+def _references(equation: Equation) -> Iterator[tuple[Path_, object, str]]:
+    yield ("proportional", "weight"), equation.proportional.weight, "proportional-weight"
+    yield ("derivative", "weight"), equation.derivative.weight, "derivative-weight"
+    if equation.derivative.filter is not None:
+        for key in ("ratio", "gain", "time"):
+            yield ("derivative", "filter", key), getattr(equation.derivative.filter, key), f"filter-{key}"
+    tracking = getattr(equation.integral.windup, "tracking_time", None)
+    yield ("integral", "windup", "tracking-time"), tracking, "tracking-time"
+
+
+def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
+    """A weight goes with 'on: weighted' and with nothing else."""
+    for term in ("proportional", "derivative"):
+        part = getattr(variant.equation, term)
+        if (part.on == "weighted") != (part.weight is not None):
+            message = "'on: weighted' needs 'weight'" if part.weight is None else f"'weight' has no meaning with 'on: {part.on}'"
+            yield variant.card.document.problem(variant.home((term, "on")), message, at_key=True)
+
+
+def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
+    """A filter has one measure, and sits where the form has a place for it."""
+    equation, document = variant.equation, variant.card.document
+    filt = equation.derivative.filter
+    if filt is None:
+        return
+    home = variant.home(("derivative", "filter"))
+    if sum(x is not None for x in (filt.ratio, filt.gain, filt.time)) != 1:
+        yield document.problem(home, "a filter needs exactly one of ratio, gain and time", at_key=True)
+    if filt.applies_to == "lead-lag" and equation.form != "series":
+        yield document.problem(home, f"a lead-lag belongs to the series form, this is '{equation.form.value}'", at_key=True)
+    if filt.order == 2 and filt.applies_to != "measurement":
+        yield document.problem(home, "a filter of order 2 is defined for the measurement only", at_key=True)
+    if filt.of == "effective-derivative" and filt.time is not None:
+        yield document.problem(home, "'of' refers to ratio or gain, not to time", at_key=True)
+
+
+def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
+    """The windup scheme fits the implementation and the rule."""
+    equation, document = variant.equation, variant.card.document
+    scheme, home = equation.integral.windup.scheme, variant.home(("integral", "windup"))
+    if (scheme == "velocity") != (equation.implementation == "velocity"):
+        yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
+    if scheme == "external-reset" and equation.integral.rule == "trapezoidal":
+        yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
+    if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
+        place = variant.home(("proportional", "accumulated"))
+        yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
+    if scheme == "clamp-sum" and equation.implementation == "positional" and equation.proportional.on == "pv" and not equation.proportional.accumulated:
+        yield document.problem(home, "clamp-sum with P on pv needs 'proportional.accumulated: true'", at_key=True)
+
+
+def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
+    """The one-scan example of the action is true when it is run."""
+    example, names = variant.equation.action.example, variant.equation.action.names
+    home = variant.home(("action", "example"))
+    words = {word: sense for sense, word in names.items()}
+    if set(names) != {"reverse", "direct"}:
+        yield variant.card.document.problem(home, "names needs both 'reverse' and 'direct'", at_key=True)
+    elif example.name not in words:
+        yield variant.card.document.problem(home, f"'{example.name}' is not one of the names: {', '.join(words)}", at_key=True)
+    elif example.sp == example.pv:
+        yield variant.card.document.problem(home, "setpoint and measurement must differ", at_key=True)
+    else:
+        falls = (example.pv > example.sp) == (words[example.name] == "reverse")
+        if falls != (example.output == "falls"):
+            message = f"with {words[example.name]} action the output {'falls' if falls else 'rises'}, the example says it {example.output}"
+            yield variant.card.document.problem(home, message, at_key=True)
+
+
+RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
+    reject_bad_units,
+    reject_bad_numbers,
+    reject_unexplained_defaults,
+    reject_bad_scan,
+    reject_missing_dials,
+    reject_bad_references,
+    reject_bad_weights,
+    reject_bad_filter,
+    reject_bad_windup,
+    reject_wrong_action,
+)

@@ -1,0 +1,58 @@
+"""Rules that compute with a card: its examples, and a scan program for every combination of options."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from pidemu.card.load import Card, Variant, variants
+from pidemu.emulator import Controller
+from pidemu.errors import PidemuError, Problem
+from pidemu.settings import Settings, is_active, limits
+
+_EXAMPLE_TOLERANCE: Final = 5.1e-6
+"""Examples are printed with six digits."""
+
+
+def reject_wrong_examples(card: Card) -> Iterator[Problem]:
+    """Every example is run."""
+    for i, example in enumerate(card.data.examples):
+        try:
+            law = card.settings(example.given).law()
+            n0, n1, n2, d1, d2 = law.coefficients()
+        except PidemuError as error:
+            yield card.document.problem(("examples", i, "given"), str(error), at_key=True)
+            continue
+        if abs(d2) > 1e-12:
+            yield card.document.problem(("examples", i), "a second-order filter has no parallel gains; choose settings without it")
+            continue
+        kp = n1 - n0 * d1
+        found = {"kp": kp, "ki": n0, "kd": n2 - kp * d1, "Tf": d1}
+        stated = {"kp": example.canonical.kp, "ki": example.canonical.ki, "kd": example.canonical.kd, "Tf": example.canonical.Tf}
+        for name, value in found.items():
+            if not math.isclose(stated[name], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-9):
+                yield card.document.problem(("examples", i, "canonical", name), f"{name} is {stated[name]:g}, the settings amount to {value:.6g}")
+
+
+def reject_unrunnable(card: Card) -> Iterator[Problem]:
+    """Every combination of options compiles to a scan program, or says that it is not defined."""
+    for variant in variants(card):
+        try:
+            Controller(_plausible(variant)).scan(50.0, 49.0)
+        except PidemuError as error:
+            if "not defined" not in str(error):
+                yield card.document.problem(("options",), f"{dict(variant.chosen)}: {error}")
+
+
+def _plausible(variant: Variant) -> Settings:
+    values: dict[str, object] = dict(variant.chosen)
+    for name, s in variant.equation.settings.items():
+        if s.default is None and is_active(variant.equation, name, s):
+            low, high = limits(s)
+            middle = math.sqrt(max(low, 1e-3) * min(high, 1e3))
+            values[name] = min(max(1.0, low), high) if low <= 1 <= high else middle
+    return variant.card.settings(values)
+
+
+RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (reject_wrong_examples, reject_unrunnable)

@@ -1,0 +1,117 @@
+"""Rules on what a card states, and on what it rests: one function each, which says in one sentence why."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from pidemu.card.load import Card, dotted, leaves, variants
+from pidemu.card.models import Status
+from pidemu.card.source import Path_
+from pidemu.errors import Problem, suggest
+from pidemu.settings import RESERVED
+
+
+def reject_wrong_folder(card: Card) -> Iterator[Problem]:
+    """The id is the path, so the folder carries the vendor's name."""
+    slug = re.sub(r"[^a-z0-9]+", "-", card.data.vendor.lower()).strip("-")
+    folder = card.id.split("/")[0]
+    if slug != folder:
+        yield card.document.problem(("vendor",), f"vendor '{card.data.vendor}' belongs in folder '{slug}', the card is in '{folder}'")
+
+
+def reject_dangling_sources(card: Card) -> Iterator[Problem]:
+    """A claim names a source that is listed."""
+    for path, key in _source_references(card):
+        if key not in card.data.sources:
+            yield card.document.problem(path, f"no source '{key}'{suggest(key, card.data.sources)}; list it under sources")
+
+
+def reject_unused_sources(card: Card) -> Iterator[Problem]:
+    """A source that proves nothing is noise."""
+    used = {key for _, key in _source_references(card)}
+    for key in card.data.sources:
+        if key not in used:
+            yield card.document.problem(("sources", key), f"source '{key}' is not used by any evidence, quirk or example", at_key=True)
+
+
+def _source_references(card: Card) -> Iterator[tuple[Path_, str]]:
+    for key, evidence in card.data.evidence.items():
+        if evidence.source is not None:
+            yield ("evidence", key, "source"), evidence.source
+    for part, items in (("quirks", card.data.quirks), ("examples", card.data.examples)):
+        for i, item in enumerate(items):
+            if item.source is not None:
+                yield (part, i, "source"), item.source
+
+
+def reject_incomplete_evidence(card: Card) -> Iterator[Problem]:
+    """Each status owes its reader something: a place in a source, or a reason."""
+    for key, e in card.data.evidence.items():
+        if e.status in (Status.DOCUMENTED, Status.MEASURED):
+            wanted = [n for n in ("source", "at") if getattr(e, n) is None]
+        elif e.status is Status.INFERRED:
+            wanted = [n for n in ("source", "note") if getattr(e, n) is None]
+        else:
+            wanted = ["note"] if e.note is None else []
+        for name in wanted:
+            yield card.document.problem(("evidence", key), f"'{e.status.value}' needs '{name}'", at_key=True)
+
+
+def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
+    """An evidence path leads to something in the card."""
+    known = {dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1)}
+    for key in card.data.evidence:
+        if key not in known:
+            yield card.document.problem(("evidence", key), f"nothing at '{key}' in this card{suggest(key, known)}", at_key=True)
+
+
+def reject_fields_without_evidence(card: Card) -> Iterator[Problem]:
+    """Every field of the algorithm says where it comes from, if only that it is assumed."""
+    seen = set()
+    for variant in variants(card):
+        for path in leaves(variant.raw):
+            home = variant.home(path)
+            if home not in seen and card.evidence_key(home) is None:
+                yield card.document.problem(home, f"no evidence covers '{dotted(home)}'; add it under evidence, if only as assumed", at_key=True)
+            seen.add(home)
+    for name in card.data.options:
+        if card.evidence_key(("options", name, "default")) is None:
+            yield card.document.problem(("options", name, "default"), f"no evidence covers 'options.{name}.default'", at_key=True)
+
+
+def reject_overlapping_options(card: Card) -> Iterator[Problem]:
+    """Two options that change the same field would make their order matter."""
+    owner: dict[Path_, str] = {}
+    for name, option in card.data.options.items():
+        mine = {path for fields in option.choices.values() for path in leaves(fields) if path}
+        for path in sorted(mine, key=dotted):
+            other = owner.setdefault(path, name)
+            if other != name:
+                message = f"'{dotted(path)}' is changed by option {other} as well; let one option do it"
+                yield card.document.problem(("options", name), message, at_key=True)
+
+
+def reject_ambiguous_names(card: Card) -> Iterator[Problem]:
+    """Settings and options are told apart by name alone, in upper or lower case."""
+    seen: dict[str, str] = {}
+    for name in [*card.all_settings(), *card.data.options]:
+        path = ("options", name) if name in card.data.options else ("settings", name)
+        if name in RESERVED:
+            yield card.document.problem(path, f"'{name}' is reserved for the signal range", at_key=True)
+        if name.casefold() in seen:
+            yield card.document.problem(path, f"'{name}' and '{seen[name.casefold()]}' cannot be told apart", at_key=True)
+        seen[name.casefold()] = name
+
+
+RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
+    reject_wrong_folder,
+    reject_dangling_sources,
+    reject_unused_sources,
+    reject_incomplete_evidence,
+    reject_evidence_for_nothing,
+    reject_fields_without_evidence,
+    reject_overlapping_options,
+    reject_ambiguous_names,
+)

@@ -1,0 +1,81 @@
+"""The command line. Each command lives in a module of its own, imported when it is called."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Final
+
+import click
+
+_COMMANDS: Final = {
+    "cards": "List the cards, and how sure they are.",
+    "show": "Show a card as a data sheet, with its evidence.",
+    "check": "Check cards, the built-in ones or those given.",
+    "convert": "Convert settings to another card, with a certificate.",
+    "run": "Run a card on recorded signals.",
+    "code": "Print the scan program of a card with its settings.",
+}
+
+
+class _Lazy(click.Group):
+    """A group that imports a command when it is called, so that ``--help`` is quick."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        command: click.Command = import_module(f"pidemu.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+
+
+
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="pidemu", prog_name="pidemu", message="%(prog)s %(version)s")
+def cli() -> None:
+    """What a PID setting means on whose controller.
+
+    Emulates the PID algorithms of industrial controllers and converts settings between them, with proof.
+    Exit status: 0; 1 for a refusal or a failed check; 2 for wrong usage.
+    """
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        What follows ``pidemu``; by default what was typed.
+    """
+    try:
+        status = cli.main(arguments, prog_name="pidemu", standalone_mode=False)
+    except click.exceptions.Abort:
+        status = 130
+    except click.ClickException as error:
+        error.show()
+        status = error.exit_code
+    except Exception as error:
+        status = _report(error)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _report(error: Exception) -> int:
+    """Print an error of ours and return the exit status; pass on what is none of ours."""
+    from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError
+
+    if isinstance(error, BrokenPipeError):
+        sys.stderr.close()
+        return 0
+    if not isinstance(error, PidemuError):
+        raise error
+    click.echo(f"error: {error}", err=True)
+    failed = isinstance(error, ConversionRefusedError | CardError) and not isinstance(error, CardNotFoundError)
+    return 1 if failed else 2

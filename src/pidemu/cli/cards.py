@@ -1,0 +1,52 @@
+"""``pidemu cards``."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import click
+
+from pidemu.card.library import card_files
+from pidemu.card.load import Card, load_file
+from pidemu.card.models import Status
+from pidemu.cli.common import json_option, print_json, table, vendors_option
+from pidemu.errors import CardError
+
+
+@click.command("cards", short_help="List the cards, and how sure they are.")
+@click.argument("word", required=False)
+@vendors_option
+@json_option
+def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
+    """List the cards whose id or title holds WORD, with how many of their statements are documented, measured, inferred or assumed."""
+    rows: list[Card] = []
+    broken: list[str] = []
+    for card_id, file in card_files(vendors).items():
+        try:
+            card = load_file(file, card_id)
+        except CardError as error:
+            broken.append(f"{card_id}: {error.problems[0].headline()}")
+            continue
+        if word is None or word.casefold() in f"{card.id} {card.title}".casefold():
+            rows.append(card)
+    if as_json:
+        print_json([{"card": c.id, "title": c.title, "status": _counts(c)} for c in rows])
+    else:
+        table(
+            ["card", "", *(s.value for s in Status)],
+            [[c.id, c.title, *(str(n) for n in _counts(c).values())] for c in rows],
+            indent=0,
+            right=(2, 3, 4, 5),
+        )
+    for message in broken:
+        click.echo(f"error: {message}", err=True)
+    if not rows and not broken:
+        raise click.UsageError(f"no card holds '{word}'; 'pidemu cards' lists all")
+    if broken:
+        raise SystemExit(1)
+
+
+def _counts(card: Card) -> dict[str, int]:
+    """Return how many fields of the default variant have each status."""
+    found = Counter(s.evidence.status for s in card.variant().statements() if s.evidence)
+    return {s.value: found[s] for s in Status}

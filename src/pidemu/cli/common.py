@@ -1,0 +1,156 @@
+"""What the commands share: arguments, numbers in print, tables."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import click
+
+from pidemu.card.library import load_card
+from pidemu.card.load import Card
+from pidemu.errors import SettingError
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+vendors_option = click.option(
+    "--vendors", multiple=True, metavar="DIR", help="A folder of your own cards, <vendor>/<block>.yaml; searched first. Repeatable."
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
+
+
+class Pair(click.ParamType[tuple[float, float]]):
+    """Two numbers with a comma between, such as ``0,200``."""
+
+    name = "LOW,HIGH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Read the two numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            low, high = (float(x) for x in str(value).split(","))
+        except ValueError:
+            self.fail(f"'{value}' is not two numbers such as 0,200", param, ctx)
+        return low, high
+
+
+class Scan(click.ParamType[tuple[float, float]]):
+    """One scan interval, or two with a comma between [s]."""
+
+    name = "H[,H2]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Read one or two intervals."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            intervals = [float(x) for x in str(value).removesuffix("s").split(",")]
+            if not 1 <= len(intervals) <= 2 or not all(math.isfinite(x) and x > 0 for x in intervals):
+                raise ValueError
+        except ValueError:
+            self.fail(f"'{value}' is no scan interval; write seconds, such as 0.5, or 1,0.5 for source and target", param, ctx)
+        return intervals[0], intervals[-1]
+
+
+def assignments(words: Iterable[str], what: str = "NAME=VALUE") -> dict[str, object]:
+    """Read ``NAME=VALUE`` words.
+
+    Raises
+    ------
+    SettingError
+        A word has no ``=``, or a name comes twice.
+    """
+    found: dict[str, object] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        name = name.strip()
+        if not equals or not name or not value.strip():
+            raise SettingError(f"'{word}' is not {what}; write for example GAIN=2 or \"RESET=20 s/repeat\"")
+        if name in found:
+            raise SettingError(f"{name} is given twice, {found[name]} and {value}; give it once")
+        found[name] = value.strip()
+    return found
+
+
+def split_options(card: Card, given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, object]]:
+    """Split what was given for a card into options and dials."""
+    options = {o.casefold() for o in card.options}
+    chosen = {k: v for k, v in given.items() if k.casefold() in options}
+    return chosen, {k: v for k, v in given.items() if k not in chosen}
+
+
+def find(name: str, vendors: Sequence[str]) -> Card:
+    """Return a card by id or file."""
+    return load_card(name, vendors)
+
+
+def number(x: float) -> str:
+    """Return a number in six significant digits, as people write it."""
+    if math.isinf(x):
+        return "inf" if x > 0 else "-inf"
+    text = f"{x:.6g}"
+    return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
+
+
+def heading(text: str) -> None:
+    """Print a heading: bold for people, plain when piped."""
+    click.secho(text, bold=True)
+
+
+def _width(text: str) -> int:
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int = 2, right: Sequence[int] = ()) -> None:
+    """Print a table: aligned plain text when piped, a rich table on a terminal.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings; all empty for none.
+    rows : sequence of sequence of str
+        Cells.
+    indent : int
+        Spaces to the left.
+    right : sequence of int
+        Columns that hold numbers, aligned to the right.
+    """
+    if sys.stdout.isatty():
+        _rich(columns, rows, indent, right)
+        return
+    lines = [list(columns), *([list(r) for r in rows])] if any(columns) else [list(r) for r in rows]
+    widths = [max((_width(line[i]) for line in lines), default=0) for i in range(len(columns))]
+    for line in lines:
+        cells = []
+        for i, cell in enumerate(line):
+            pad = " " * (widths[i] - _width(cell))
+            cells.append(pad + cell if i in right else cell + pad)
+        click.echo((" " * indent + "  ".join(cells)).rstrip())
+
+
+def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, right: Sequence[int]) -> None:
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table(box=None, show_header=any(columns), header_style="bold", pad_edge=False)
+    for i, column in enumerate(columns):
+        grid.add_column(Text(column), justify="right" if i in right else "left", overflow="fold")
+    for row in rows:
+        grid.add_row(*(Text(cell, style=_style(cell)) for cell in row))
+    Console().print(Padding(grid, (0, 0, 0, indent)))
+
+
+def _style(cell: str) -> str:
+    return {"assumed": "yellow", "inferred": "cyan", "documented": "green", "measured": "green"}.get(cell, "")
+
+
+def print_json(value: Any) -> None:
+    """Print plain values as JSON."""
+    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=str))

@@ -1,0 +1,68 @@
+"""A loop in a file: what to convert from, with which settings, and to what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from pidemu.card.faults import problems
+from pidemu.card.models import Model, Number, Text
+from pidemu.card.source import parse_file
+from pidemu.errors import CardError
+
+
+class LoopFile(Model):
+    """Settings of one loop and the card they go to."""
+
+    about: Text | None = Field(default=None, description="Where the loop comes from.")
+    card: Text = Field(description="The card of the settings.")
+    settings: dict[Text, str | Number] = Field(description="Settings and options by name.")
+    to: Text | None = Field(default=None, description="The card to convert to.")
+    set_: dict[Text, str | Number] = Field(default={}, description="Options of the target, and dials that shall have a value.", alias="set")
+    scan: list[Number] | None = Field(default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s].")
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """What a loop file says.
+
+    Attributes
+    ----------
+    card, to : str
+        Source and target card.
+    settings, set : dict
+        What is given for the source and for the target.
+    scan : tuple of float or None
+        Scan intervals [s].
+    """
+
+    card: str
+    settings: dict[str, Any]
+    to: str | None
+    set: dict[str, Any]
+    scan: tuple[float, float] | None
+
+
+def read_loop(file: Path) -> Loop:
+    """Read a loop file.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+
+    Raises
+    ------
+    CardError
+        The file is wrong: every problem, located.
+    """
+    document = parse_file(file)
+    try:
+        loop = LoopFile.model_validate(document.value)
+    except ValidationError as error:
+        raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
+    scan = (loop.scan[0], loop.scan[-1]) if loop.scan else None
+    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan)

@@ -1,0 +1,136 @@
+"""Random but sensible settings of any card, scan intervals for them, and a card made up on the spot."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from hypothesis import assume
+from hypothesis import strategies as st
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.load import Card, card_from
+from pidemu.card.models import Rule, Setting
+from pidemu.card.source import parse
+from pidemu.errors import SettingError
+from pidemu.scan.program import Program
+from pidemu.settings import Settings, is_active, limits, off_values
+from pidemu.targets.python import compiled
+from pidemu.units import Role, from_canonical, parse_unit
+
+Floats = npt.NDArray[np.float64]
+
+WIDE = (-1e12, 1e12)
+"""Output limits that no test signal reaches."""
+
+_SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
+    Role.GAIN: st.floats(0.05, 50),
+    Role.MULTIPLIER: st.floats(0.1, 10),
+    Role.INTEGRAL: st.floats(1, 3000).map(lambda seconds: 1 / seconds),
+    Role.DERIVATIVE: st.just(0.0) | st.floats(0.1, 600),
+    Role.FILTER_TIME: st.just(0.0) | st.floats(0.1, 100),
+    Role.FILTER_RATIO: st.floats(0.01, 1),
+    Role.FILTER_GAIN: st.floats(1, 30),
+    Role.PROPORTIONAL_WEIGHT: st.floats(0, 1),
+    Role.DERIVATIVE_WEIGHT: st.floats(0, 1),
+    Role.TRACKING_TIME: st.floats(1, 3000),
+}
+"""Canonical values by role (specs/equations.md, section 1)."""
+
+
+def option_combinations(card: Card) -> list[dict[str, str]]:
+    """Every way to choose the card's options."""
+    names = list(card.options)
+    return [dict(zip(names, choices, strict=True)) for choices in itertools.product(*card.options.values())]
+
+
+@st.composite
+def dial_values(draw: st.DrawFn, setting: Setting) -> float:
+    """A value for one dial, in its unit: an off value now and then, otherwise a sensible one inside its range."""
+    off = off_values(setting)
+    if off and draw(st.integers(0, 7)) == 0:
+        return draw(st.sampled_from(off))
+    role = Role(setting.sets)
+    value = from_canonical(role, draw(_SENSIBLE[role]), parse_unit(setting.unit))
+    low, high = limits(setting)
+    value = min(max(value, low), high)
+    if math.isinf(value) and value not in off:  # a derivative of zero has no value on a dial that cannot show it
+        value = from_canonical(role, 1.0, parse_unit(setting.unit))
+    return value
+
+
+@st.composite
+def dials_of(draw: st.DrawFn, card: Card) -> dict[str, object]:
+    """Valid settings of a card by name, under any choice of its options; choices that the card refuses are left out."""
+    options = draw(st.sampled_from(option_combinations(card)))
+    equation = card.variant(options).equation
+    given: dict[str, object] = dict(options)
+    for name, setting in equation.settings.items():
+        if not is_active(equation, name, setting) or (setting.default is not None and draw(st.integers(0, 4)) == 0):
+            continue
+        given[name] = draw(dial_values(setting))
+    refused = False
+    try:
+        card.settings(given).algorithm()
+    except SettingError as error:
+        refused = "not defined" in str(error)
+        if not refused:
+            raise
+    assume(not refused)
+    return given
+
+
+def settings_of(data: st.DataObject, card: Card) -> Settings:
+    """Draw valid settings of a card; a failure prints the dials, not the whole card."""
+    return card.settings(data.draw(dials_of(card)))
+
+
+@st.composite
+def scans_of(draw: st.DrawFn, algorithm: Algorithm) -> float:
+    """A scan interval [s] at which the algorithm is stable, from 0.05 s to 10 s or to its filter time."""
+    forward = Rule.FORWARD in (algorithm.derivative_rule, algorithm.filter_rule) and algorithm.Tf
+    highest = min(10.0, algorithm.Tf) if forward else 10.0
+    return draw(st.floats(min(0.05, highest / 2), highest))
+
+
+def made_up_card(**fields: Any) -> Card:
+    """Return a card with the given fields over those of a plain parallel PID (JSON is YAML)."""
+    plain: dict[str, Any] = {
+        "card": 1,
+        "vendor": "Nobody",
+        "product": "test bench",
+        "algorithm": "PID",
+        "sources": {"own": {"title": "made up", "read": "2026-01-01"}},
+        "form": "parallel",
+        "implementation": "positional",
+        "proportional": {"on": "error"},
+        "integral": {"rule": "backward", "windup": {"scheme": "none"}},
+        "derivative": {"on": "error"},
+        "transfer": {"start": "bumpless"},
+        "settings": {
+            "kp": {"sets": "gain", "unit": "%/%"},
+            "ki": {"sets": "integral", "unit": "1/s", "off": 0, "default": 0},
+            "kd": {"sets": "derivative", "unit": "s", "off": 0, "default": 0},
+        },
+        "action": {
+            "names": {"reverse": "Reverse", "direct": "Direct"},
+            "example": {"name": "Reverse", "sp": 50, "pv": 51, "output": "falls"},
+        },
+        "scan": {"default": "1 s"},
+        "output": {"limits": [0, 100]},
+        "evidence": {"form": {"status": "assumed", "note": "made up"}},
+        "examples": [{"given": {"kp": 1}, "canonical": {"kp": 1, "ki": 0, "kd": 0}}],
+    }
+    return card_from(parse(json.dumps(plain | fields), "made-up.yaml"), "nobody/bench")
+
+
+def outputs(program: Program, sp: Floats, pv: Floats, auto: Floats | None = None, manual: Floats | None = None) -> Floats:
+    """Run a program from its initial state."""
+    state = list(program.initial)
+    modes = np.ones_like(sp) if auto is None else auto
+    held = np.full_like(sp, math.nan) if manual is None else manual
+    return np.array(compiled(program).run(state, sp.tolist(), pv.tolist(), modes.tolist(), held.tolist()))

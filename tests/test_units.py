@@ -1,0 +1,255 @@
+"""Dials against specs/equations.md, section 1."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pidemu.errors import UnitError
+from pidemu.units import (
+    UNITS,
+    Dimension,
+    Role,
+    Spans,
+    check_unit,
+    convert_unit,
+    from_canonical,
+    is_reciprocal,
+    parse_quantity,
+    parse_unit,
+    to_canonical,
+)
+
+
+def fits(role: Role, unit: str) -> bool:
+    try:
+        check_unit(role, UNITS[unit])
+    except UnitError:
+        return False
+    return True
+
+
+DIALS = [(role, unit) for role in Role for unit in UNITS if fits(role, unit)]
+INTEGRAL_FACTORS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
+
+
+@pytest.mark.parametrize(
+    ("role", "dial", "unit", "spans", "canonical"),
+    [
+        pytest.param(Role.GAIN, 2.5, "%/%", Spans(), 2.5, id="gain in percent per percent"),
+        pytest.param(Role.GAIN, 40.0, "%", Spans(), 2.5, id="proportional band: K = 100/PB"),
+        pytest.param(Role.GAIN, 50.0, "eu", Spans(pv=200.0), 4.0, id="proportional band in EU: K = PV span/PB"),
+        pytest.param(Role.GAIN, 0.5, "eu/eu", Spans(pv=200.0, op=50.0), 2.0, id="gain per EU: K = gain PV span/OP span"),
+        pytest.param(Role.GAIN, 0.5, "%/eu", Spans(pv=200.0, op=50.0), 1.0, id="percent per EU: K = gain PV span/100"),
+        pytest.param(Role.GAIN, 6.0, "psi/in", Spans(pv=4.0, op=12.0), 2.0, id="sensitivity: K = S pen span/output span"),
+        pytest.param(Role.INTEGRAL, 0.25, "min/repeat", Spans(), 1 / 15, id="minutes per repeat: Ti"),
+        pytest.param(Role.INTEGRAL, 15.0, "s/repeat", Spans(), 1 / 15, id="seconds per repeat: Ti"),
+        pytest.param(Role.INTEGRAL, 4.0, "repeat/min", Spans(), 1 / 15, id="repeats per minute: Ti = 1/rate"),
+        pytest.param(Role.INTEGRAL, 2.0, "repeat/s", Spans(), 2.0, id="repeats per second: Ti = 1/rate"),
+        pytest.param(Role.INTEGRAL, 240.0, "repeat/h", Spans(), 1 / 15, id="repeats per hour: Ti = 1/rate"),
+        pytest.param(Role.INTEGRAL, 4.0, "1/min", Spans(), 1 / 15, id="integral gain per minute: ki"),
+        pytest.param(Role.INTEGRAL, 0.3, "1/s", Spans(), 0.3, id="integral gain per second: ki"),
+        pytest.param(Role.INTEGRAL, 0.25, "min", Spans(), 1 / 15, id="parallel integral time: ki = 1/Ip"),
+        pytest.param(Role.DERIVATIVE, 0.5, "min", Spans(), 30.0, id="derivative in minutes"),
+        pytest.param(Role.DERIVATIVE, 30.0, "s", Spans(), 30.0, id="derivative in seconds"),
+        pytest.param(Role.DERIVATIVE, 250.0, "ms", Spans(), 0.25, id="derivative in milliseconds"),
+        pytest.param(Role.FILTER_TIME, 0.1, "min", Spans(), 6.0, id="filter time"),
+        pytest.param(Role.TRACKING_TIME, 2.0, "min", Spans(), 120.0, id="tracking time"),
+        pytest.param(Role.FILTER_RATIO, 12.5, "%", Spans(), 0.125, id="filter ratio in percent"),
+        pytest.param(Role.PROPORTIONAL_WEIGHT, 0.7, "1", Spans(), 0.7, id="setpoint weight"),
+        pytest.param(Role.MULTIPLIER, 3.0, "1", Spans(), 3.0, id="overall multiplier"),
+    ],
+)
+def test_a_dial_means_what_section_1_says_and_back(
+    role: Role, dial: float, unit: str, spans: Spans, canonical: float
+) -> None:
+    assert canonical == to_canonical(role, dial, parse_unit(unit), spans)
+    assert dial == from_canonical(role, canonical, parse_unit(unit), spans)
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("rep/min", "repeat/min"),
+        ("reps/min", "repeat/min"),
+        ("Repeats per Minute", "repeat/min"),
+        ("rpm", "repeat/min"),
+        ("rpt/min", "repeat/min"),
+        ("minutes per repeat", "min/repeat"),
+        ("min / rep", "min/repeat"),
+        ("mn/rep", "min/repeat"),
+        ("sec/rep", "s/repeat"),
+        ("seconds", "s"),
+        ("secs", "s"),
+        ("SEC", "s"),
+        ("msec", "ms"),
+        ("hrs", "h"),
+        ("hours", "h"),
+        ("repeats/hour", "repeat/h"),
+        ("1/sec", "1/s"),
+        ("/min", "1/min"),
+        ("percent", "%"),
+        ("percent/EU", "%/eu"),
+        ("EU/EU", "eu/eu"),
+        ("psi/in", "eu/eu"),
+        ("psi per inch", "eu/eu"),
+        ("", "1"),
+    ],
+)
+def test_people_spell_units_in_many_ways(written: str, name: str) -> None:
+    assert name == parse_unit(written).name
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_every_unit_reads_its_own_spelling(name: str) -> None:
+    assert UNITS[name] == parse_unit(name)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"), [("repaet/min", "repeat/min"), ("min/repaet", "min/repeat"), ("s/reepat", "s/repeat")]
+)
+def test_an_unknown_unit_is_refused_with_the_nearest_one(written: str, meant: str) -> None:
+    with pytest.raises(UnitError, match=rf"unknown unit '{written}' \(did you mean '{meant}'\?\); known units: 1, "):
+        parse_unit(written)
+
+
+def test_an_unknown_unit_far_from_all_is_refused_without_a_suggestion() -> None:
+    with pytest.raises(UnitError, match="unknown unit 'furlong'; known units"):
+        parse_unit("furlong")
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "unit"),
+    [
+        ("20 s/repeat", 20.0, "s/repeat"),
+        ("20s/repeat", 20.0, "s/repeat"),
+        (" -1.5e-3 min ", -1.5e-3, "min"),
+        (".5 min", 0.5, "min"),
+        ("5. min", 5.0, "min"),
+        ("+4 repeats per minute", 4.0, "repeat/min"),
+        ("inf s", math.inf, "s"),
+        ("Infinity min/repeat", math.inf, "min/repeat"),
+        ("40%", 40.0, "%"),
+    ],
+)
+def test_a_quantity_is_a_number_and_a_unit(text: str, number: float, unit: str) -> None:
+    assert (number, UNITS[unit]) == parse_quantity(text)
+
+
+def test_a_quantity_may_leave_its_unit_out() -> None:
+    assert (7.25, None) == parse_quantity("7.25")
+
+
+@pytest.mark.parametrize("text", ["0,5 min", "1,000", "2,5"])
+def test_a_decimal_comma_is_refused_with_the_remedy(text: str) -> None:
+    with pytest.raises(UnitError, match="has a comma; write a decimal point"):
+        parse_quantity(text)
+
+
+@pytest.mark.parametrize("text", ["", "min", "fast", "--3 s", "e5"])
+def test_a_text_without_a_number_is_refused(text: str) -> None:
+    with pytest.raises(UnitError, match="is not a number, nor a number with a unit"):
+        parse_quantity(text)
+
+
+@pytest.mark.parametrize(
+    ("role", "unit"),
+    [
+        (Role.GAIN, "s"),
+        (Role.GAIN, "repeat/min"),
+        (Role.INTEGRAL, "%"),
+        (Role.INTEGRAL, "%/%"),
+        (Role.DERIVATIVE, "repeat/min"),
+        (Role.DERIVATIVE, "s/repeat"),
+        (Role.DERIVATIVE, "1/s"),
+        (Role.FILTER_TIME, "1"),
+        (Role.FILTER_RATIO, "s"),
+        (Role.DERIVATIVE_WEIGHT, "eu"),
+    ],
+)
+def test_a_unit_of_the_wrong_dimension_is_refused_with_units_that_fit(role: Role, unit: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        to_canonical(role, 1.0, UNITS[unit])
+    message = str(caught.value)
+    assert message.startswith(f"'{unit}' is {UNITS[unit].dimension.value} and cannot set {role.value.replace('-', ' ')}; ")
+    offered = message.split("use one of: ")[1].split(", ")
+    assert all(fits(role, name) for name in offered)
+
+
+def test_not_a_number_is_refused() -> None:
+    with pytest.raises(UnitError, match="not a number"):
+        to_canonical(Role.GAIN, math.nan, UNITS["%/%"])
+
+
+def test_four_repeats_per_minute_are_exactly_fifteen_seconds_per_repeat() -> None:
+    assert 15.0 == convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["s/repeat"])
+    assert 0.25 == convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["min/repeat"])
+    assert 4.0 == convert_unit(Role.INTEGRAL, 15.0, UNITS["s/repeat"], UNITS["repeat/min"])
+
+
+@given(
+    rate=st.floats(1e-6, 1e6),
+    old=st.sampled_from(sorted(INTEGRAL_FACTORS)),
+    new=st.sampled_from(sorted(INTEGRAL_FACTORS)),
+)
+def test_a_reset_rate_becomes_an_integral_time_by_exact_arithmetic_rounded_once(rate: float, old: str, new: str) -> None:
+    exact = INTEGRAL_FACTORS[old] / Fraction(rate) / INTEGRAL_FACTORS[new]
+    assert float(exact) == convert_unit(Role.INTEGRAL, rate, UNITS[f"repeat/{old}"], UNITS[f"{new}/repeat"])
+
+
+@given(dial=st.sampled_from(DIALS), value=st.floats(1e-9, 1e9), pv=st.floats(0.01, 1e5), op=st.floats(0.01, 1e5))
+def test_a_dial_value_survives_the_way_to_canonical_and_back(
+    dial: tuple[Role, str], value: float, pv: float, op: float
+) -> None:
+    role, unit, spans = dial[0], UNITS[dial[1]], Spans(pv, op)
+    there = to_canonical(role, value, unit, spans)
+    # each way rounds once, by half a unit in the last place: 2^-53 each, of the value or of its reciprocal
+    assert math.isclose(value, from_canonical(role, there, unit, spans), rel_tol=2**-51)
+
+
+@given(
+    role=st.sampled_from(list(Role)), value=st.floats(1e-9, 1e9), pv=st.floats(0.01, 1e5), op=st.floats(0.01, 1e5),
+    data=st.data(),
+)  # fmt: skip
+def test_a_conversion_between_dials_keeps_the_canonical_value(
+    role: Role, value: float, pv: float, op: float, data: st.DataObject
+) -> None:
+    units = st.sampled_from([UNITS[unit] for r, unit in DIALS if r is role])
+    old, new, spans = data.draw(units), data.draw(units), Spans(pv, op)
+    converted = convert_unit(role, value, old, new, spans)
+    # three roundings: the conversion, and one canonical value on either side
+    assert math.isclose(
+        to_canonical(role, value, old, spans), to_canonical(role, converted, new, spans), rel_tol=2**-50
+    )
+
+
+@pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if is_reciprocal(r, UNITS[u])])
+def test_zero_and_infinity_change_places_on_a_reciprocal_dial(role: Role, unit: str) -> None:
+    assert 0.0 == to_canonical(role, math.inf, UNITS[unit])
+    assert math.inf == from_canonical(role, 0.0, UNITS[unit])
+    assert math.inf == to_canonical(role, 0.0, UNITS[unit])
+
+
+@pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if not is_reciprocal(r, UNITS[u])])
+def test_zero_and_infinity_stay_themselves_on_a_direct_dial(role: Role, unit: str) -> None:
+    assert 0.0 == to_canonical(role, 0.0, UNITS[unit])
+    assert math.inf == to_canonical(role, math.inf, UNITS[unit])
+
+
+def test_only_bands_and_integral_times_are_reciprocal() -> None:
+    reciprocal = {(r, UNITS[u].dimension) for r, u in DIALS if is_reciprocal(r, UNITS[u])}
+    assert {
+        (Role.GAIN, Dimension.PERCENT),
+        (Role.GAIN, Dimension.PV_UNITS),
+        (Role.INTEGRAL, Dimension.TIME),
+        (Role.INTEGRAL, Dimension.TIME_PER_REPEAT),
+    } == reciprocal
+
+
+def test_an_integral_time_of_infinity_is_no_repeats_per_minute() -> None:
+    assert 0.0 == convert_unit(Role.INTEGRAL, math.inf, UNITS["s/repeat"], UNITS["repeat/min"])
+    assert math.inf == convert_unit(Role.INTEGRAL, 0.0, UNITS["repeat/min"], UNITS["s/repeat"])
