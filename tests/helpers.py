@@ -13,6 +13,7 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 from pidemu.algorithm import Algorithm
+from pidemu.card.library import load_card
 from pidemu.card.load import Card, card_from
 from pidemu.card.models import Rule, Setting
 from pidemu.card.source import parse
@@ -35,8 +36,8 @@ _SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
     Role.FILTER_TIME: st.just(0.0) | st.floats(0.1, 100),
     Role.FILTER_RATIO: st.floats(0.01, 1),
     Role.FILTER_GAIN: st.floats(1, 30),
-    Role.PROPORTIONAL_WEIGHT: st.floats(0, 1),
-    Role.DERIVATIVE_WEIGHT: st.floats(0, 1),
+    Role.PROPORTIONAL_WEIGHT: st.sampled_from([0.0, 1.0]) | st.floats(0.01, 1),
+    Role.DERIVATIVE_WEIGHT: st.sampled_from([0.0, 1.0]) | st.floats(0.01, 1),
     Role.TRACKING_TIME: st.floats(1, 3000),
 }
 """Canonical values by role (specs/equations.md, section 1)."""
@@ -64,8 +65,9 @@ def dial_values(draw: st.DrawFn, setting: Setting) -> float:
 
 
 @st.composite
-def dials_of(draw: st.DrawFn, card: Card) -> dict[str, object]:
-    """Valid settings of a card by name, under any choice of its options; choices that the card refuses are left out."""
+def dials_of(draw: st.DrawFn, name: str) -> dict[str, object]:
+    """Valid settings of the card of this id, by name, under any choice of its options; choices that it refuses are left out."""
+    card = load_card(name)
     options = draw(st.sampled_from(option_combinations(card)))
     equation = card.variant(options).equation
     given: dict[str, object] = dict(options)
@@ -86,7 +88,7 @@ def dials_of(draw: st.DrawFn, card: Card) -> dict[str, object]:
 
 def settings_of(data: st.DataObject, card: Card) -> Settings:
     """Draw valid settings of a card; a failure prints the dials, not the whole card."""
-    return card.settings(data.draw(dials_of(card)))
+    return card.settings(data.draw(dials_of(card.id)))
 
 
 @st.composite

@@ -8,9 +8,7 @@ from typing import Literal
 from pidemu.card.models import Rule
 
 Place = Literal["term", "measurement", "output"]
-Scheme = Literal[
-    "none", "clamp", "clamp-sum", "freeze", "conditional", "back-calculation", "external-reset", "velocity"
-]
+Scheme = Literal["none", "clamp", "clamp-sum", "freeze", "conditional", "back-calculation", "external-reset", "velocity"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Literal
 
@@ -181,4 +182,18 @@ class Controller:
         bad = np.flatnonzero(~np.isfinite(signals[0]) | ~np.isfinite(signals[1]))
         if bad.size:
             raise ScanError(f"setpoint or measurement is not a finite number in sample {bad[0]} (counted from 0)")
-        return np.array(self._compiled.run(self._state, *(s.tolist() for s in signals)))
+        out = np.empty(signals[0].size)
+        auto_on = signals[2] > 0
+        edges = [0, *(np.flatnonzero(np.diff(auto_on)) + 1).tolist(), out.size]
+        for start, end in itertools.pairwise(edges):
+            self._spell(out[start:end], *(s[start:end] for s in signals))
+        return out
+
+    def _spell(self, out: Floats, sp: Floats, pv: Floats, auto: Floats, manual: Floats) -> None:
+        """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
+        general = 1 if auto.size and auto[0] > 0 else auto.size
+        head = [s[:general].tolist() for s in (sp, pv, auto, manual)]
+        out[:general] = self._compiled.run(self._state, *head)
+        if general < out.size:
+            tail = self._compiled.run_automatic(self._state, sp[general:].tolist(), pv[general:].tolist())
+            out[general:] = np.fromiter(tail, float, len(tail))

@@ -55,7 +55,8 @@ class Record:
 def read_record(path: str | Path) -> Record:
     """Read a CSV file with a header line; lines that start with ``#`` are comments.
 
-    Columns are found by name: ``sp``, ``pv``, ``auto``, ``manual`` (or ``man``), ``output`` (or ``out``, ``op``); others are kept and ignored.
+    Columns are found by name: ``sp``, ``pv``, ``auto``, ``manual`` (or ``man``), ``output`` (or ``out``, ``op``); others are kept
+    and ignored.
 
     Parameters
     ----------

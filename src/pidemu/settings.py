@@ -9,10 +9,11 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.algorithm import Algorithm, Place, Scheme
-from pidemu.card.load import Card, Variant
+from pidemu.card.load import Card, Statement, Variant
 from pidemu.card.models import Equation, Filter, Form, Setting, WindupBackCalculation
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.units import (
+    FULL,
     Dimension,
     Role,
     Spans,
@@ -62,7 +63,7 @@ class Value:
     setting: Setting
     value: float
     unit: str
-    spans: Spans = Spans()
+    spans: Spans = FULL
     given: bool = True
     active: bool = True
     note: str = ""
@@ -129,6 +130,8 @@ class Settings(Mapping[str, Value]):
         Signal ranges [engineering units], where given.
     notes : tuple of str
         What was inferred or converted on the way in.
+    defaulted : tuple of str
+        Options that nobody chose, so that the card's default was taken.
     """
 
     variant: Variant
@@ -136,6 +139,7 @@ class Settings(Mapping[str, Value]):
     pv_range: tuple[float, float] | None = None
     op_range: tuple[float, float] | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
+    defaulted: tuple[str, ...] = field(default=(), compare=False)
 
     def __getitem__(self, name: str) -> Value:
         return self.values_by_name[name]
@@ -178,6 +182,10 @@ class Settings(Mapping[str, Value]):
         """Return the active dial that sets `role`, or ``None``."""
         return next((v for v in self.values() if v.role is role and v.active), None)
 
+    def assumptions(self) -> list[Statement]:
+        """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose."""
+        return self.variant.assumptions(self.defaulted)
+
     def algorithm(self, *, own_units: bool = False) -> Algorithm:
         """Return the algorithm with its numbers.
 
@@ -218,20 +226,24 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     options = {k: v for k, v in given.items() if _known(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
     notes: list[str] = []
-    variant = card.variant(_implied(card, options, dials, notes))
+    implied = _implied(card, options, dials, notes)
+    variant = card.variant(implied)
+    folded = {name.casefold() for name in implied}
+    defaulted = tuple(name for name in card.options if name.casefold() not in folded)
     spans = _spans(pv_range, op_range)
     values: dict[str, Value] = {}
     faults: list[str] = []
     names = {_known(k, variant.equation.settings) or k: v for k, v in dials.items()}
-    for name in names:
-        if name not in variant.equation.settings:
-            faults.append(_unknown(card, variant, name))
+    unknown = [name for name in names if name not in variant.equation.settings]
+    faults += [_unknown(card, variant, name) for name in unknown]
+    misspelt = " ".join(faults)
     for name, setting in variant.equation.settings.items():
         active = is_active(variant.equation, name, setting)
         try:
-            value = _read(card, name, setting, names.get(name), spans, active, variant.equation.form)
+            value = _read(name, setting, names.get(name), spans, active, variant.equation.form)
         except (UnitError, SettingError) as error:
-            faults.append(f"{card.id}: {name}: {error}")
+            if f"did you mean '{name}'" not in misspelt:
+                faults.append(f"{card.id}: {name}: {error}")
             continue
         if value is not None:
             values[name] = value
@@ -242,7 +254,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
                 notes.append(f"{name} is not used with {chosen}")
     if faults:
         raise SettingError("\n".join(faults))
-    return Settings(variant, values, pv_range, op_range, tuple(notes))
+    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted)
 
 
 def _known(name: str, known: Mapping[str, Any]) -> str | None:
@@ -315,9 +327,7 @@ def is_active(equation: Equation, name: str, setting: Setting) -> bool:
             return True
 
 
-def _read(
-    card: Card, name: str, setting: Setting, given: object, spans: Spans, active: bool, form: Form
-) -> Value | None:
+def _read(name: str, setting: Setting, given: object, spans: Spans, active: bool, form: Form) -> Value | None:
     unit = parse_unit(setting.unit)
     if given is None:
         if setting.default is not None:
@@ -416,7 +426,9 @@ def _algorithm(settings: Settings, *, own_units: bool) -> Algorithm:
         kp = 0.0
     if equation.form is Form.SERIES and kd and not kp:
         chosen = ", ".join(f"{o}={c}" for o, c in settings.options.items())
-        raise SettingError(f"{settings.card.id}: a series form with derivative but without proportional action is not defined; change {chosen}")
+        raise SettingError(
+            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; change {chosen}"
+        )
     windup = equation.integral.windup
     return Algorithm(
         series=equation.form is Form.SERIES,
@@ -460,7 +472,9 @@ def _filter(settings: Settings, filt: Filter | None, rate: float, time: float) -
     if filt.gain is not None:
         gain = _pick(settings, filt.gain, math.inf)
         if gain == 0:
-            raise SettingError(f"{settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative to zero instead")
+            raise SettingError(
+                f"{settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative itself to zero"
+            )
         return base / gain, place, filt.order
     return base * _pick(settings, filt.ratio, 0.0), place, filt.order
 

@@ -96,6 +96,10 @@ class Spans:
         return Fraction(self.pv) / Fraction(self.op)
 
 
+FULL: Final = Spans()
+"""Spans of 100: percent."""
+
+
 def _table() -> dict[str, Unit]:
     seconds = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
     units = [
@@ -241,7 +245,7 @@ def check_unit(role: Role, unit: Unit) -> None:
         )
 
 
-def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) -> float:
     """Return the canonical value of a dial (specs/equations.md, section 1).
 
     Parameters
@@ -275,7 +279,7 @@ def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = Spans()) -
     return _convert(role, value, unit, spans, inward=True)
 
 
-def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) -> float:
     """Return the dial value, in `unit`, of a canonical one; the inverse of `to_canonical`.
 
     Examples
@@ -304,7 +308,7 @@ def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool
         return math.copysign(math.inf, value)
 
 
-def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = Spans()) -> float:  # noqa: B008 (frozen)
+def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = FULL) -> float:
     """Express a dial value in another unit, rounding once.
 
     Examples

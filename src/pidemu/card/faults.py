@@ -93,9 +93,7 @@ def _kind(value: Any) -> str:
     return "a list" if isinstance(value, list) else f"'{value}'"
 
 
-def problems(
-    error: ValidationError, value: Any, model: type[BaseModel], document: Document, locate: Locate
-) -> Iterable[Problem]:
+def problems(error: ValidationError, value: Any, model: type[BaseModel], document: Document, locate: Locate) -> Iterable[Problem]:
     """Yield one located problem per faulty place.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,7 @@ def _holds(value: Any, path: Path_) -> bool:
     for step in path:
         if not (isinstance(value, dict) and step in value) and not (isinstance(value, list) and isinstance(step, int)):
             return False
-        value = value[step]
+        value = value[step]  # type: ignore[index]
     return True
 
 
@@ -86,6 +86,23 @@ class Statement:
     evidence: Evidence | None
     key: str
 
+    @property
+    def is_assumed(self) -> bool:
+        """Whether nobody says so."""
+        return self.evidence is not None and self.evidence.status is Status.ASSUMED
+
+    @property
+    def makes_the_law(self) -> bool:
+        """Whether the linear law depends on it; the rest matters scan by scan, at limits and at transfers only."""
+        head, *rest = self.path.split(".")
+        return (
+            head not in ("implementation", "transfer", "action", "scan", "output") and "rule" not in rest and "windup" not in rest
+        )
+
+    def __str__(self) -> str:
+        note = f" ({self.evidence.note})" if self.evidence is not None and self.evidence.note else ""
+        return f"{self.path} = {self.value}{note}"
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -108,7 +125,7 @@ class Variant:
 
     def home(self, path: Path_) -> Path_:
         """Return where a field of the equation stands in the file: in a chosen overlay, or in the card itself."""
-        for option, choice in reversed(self.chosen.items()):
+        for option, choice in reversed(list(self.chosen.items())):
             where = ("options", option, "choices", choice)
             if _holds(self.card.document.value, (*where, *path)):
                 return (*where, *path)
@@ -126,11 +143,22 @@ class Variant:
             found.append(Statement(dotted(path), value, self.card.data.evidence.get(key or ""), key or dotted(home)))
         return found
 
-    def assumptions(self) -> list[Statement]:
-        """Return what this variant only assumes: one statement per evidence entry."""
+    def assumptions(self, defaulted: Iterable[str] | None = None) -> list[Statement]:
+        """Return what this variant only assumes: one statement per evidence entry.
+
+        Parameters
+        ----------
+        defaulted : iterable of str, optional
+            Options that nobody chose, so that their assumed defaults count as well; by default all.
+        """
         seen: dict[str, Statement] = {}
+        for name in self.chosen if defaulted is None else defaulted:
+            key = self.card.evidence_key(("options", name, "default")) or ""
+            option = Statement(name, self.chosen[name], self.card.data.evidence.get(key), f"{key}:{name}")
+            if option.is_assumed:
+                seen[option.key] = option
         for statement in self.statements():
-            if statement.evidence is not None and statement.evidence.status is Status.ASSUMED:
+            if statement.is_assumed:
                 seen.setdefault(statement.key, statement)
         return list(seen.values())
 
@@ -165,9 +193,7 @@ class Card:
     @property
     def options(self) -> dict[str, tuple[str, ...]]:
         """Choices by option; the default comes first."""
-        return {
-            name: (o.default, *(c for c in o.choices if c != o.default)) for name, o in self.data.options.items()
-        }
+        return {name: (o.default, *(c for c in o.choices if c != o.default)) for name, o in self.data.options.items()}
 
     def evidence_key(self, path: Path_) -> str | None:
         """Return the longest evidence path at or above `path`."""
@@ -271,7 +297,7 @@ def _match(word: str, known: Mapping[str, Any]) -> str | None:
 
 def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]) -> Equation:
     def locate(path: Path_) -> Path_:
-        for option, choice in reversed(chosen.items()):
+        for option, choice in reversed(list(chosen.items())):
             where = ("options", option, "choices", choice)
             if path and _holds(document.value, (*where, *path)):
                 return (*where, *path)
@@ -313,8 +339,7 @@ def card_from(document: Document, card_id: str) -> Card:
             where = ("options", name, "choices", choice)
             unknown = [key for key in fields if key not in EQUATION_KEYS]
             found += [
-                document.problem((*where, key), f"unknown key '{key}'{suggest(key, EQUATION_KEYS)}", at_key=True)
-                for key in unknown
+                document.problem((*where, key), f"unknown key '{key}'{suggest(key, EQUATION_KEYS)}", at_key=True) for key in unknown
             ]
             if not unknown:
                 try:

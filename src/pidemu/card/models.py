@@ -68,7 +68,9 @@ class Source(Model):
     title: Text = Field(description="Title of the document, with number and edition; or name and version of the program.")
     address: Text | None = Field(default=None, description="Where it can be read: address, document number or repository path.")
     read: date = Field(description="The day it was read.")
-    note: Text | None = Field(default=None, description="What kind of witness it is, where that matters (a forum post, third-party code).")
+    note: Text | None = Field(
+        default=None, description="What kind of witness it is, where that matters (a forum post, third-party code)."
+    )
 
 
 class Evidence(Model):
@@ -79,7 +81,10 @@ class Evidence(Model):
         "(it follows from something documented) or `assumed` (nobody says so; shown wherever a result rests on it)."
     )
     source: Text | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
-    at: Text | None = Field(default=None, description="Place in the source: page, section, function. Required for `documented` and `measured`.")
+    at: Text | None = Field(
+        default=None,
+        description="Place in the source: page, section, function. Required for `documented` and `measured`.",
+    )
     note: Text | None = Field(default=None, description="Why: required for `inferred` and `assumed`.")
 
 
@@ -90,7 +95,8 @@ class Proportional(Model):
         description="What the term acts on: `error` (b = 1), `pv` (b = 0), `weighted` (b = `weight`), or `none`: no such term."
     )
     weight: SettingName | Number | None = Field(
-        default=None, description="Setpoint weight b where `on: weighted`: a number, or the name of the setting that holds it."
+        default=None,
+        description="Setpoint weight b where `on: weighted`: a number, or the name of the setting that holds it.",
     )
     accumulated: bool = Field(
         default=False,
@@ -109,7 +115,8 @@ class WindupClamp(Model):
     """The integral sum is limited."""
 
     scheme: Literal["clamp", "clamp-sum"] = Field(
-        description="`clamp`: limit the integral sum to the output limits, before it is used. `clamp-sum`: the same for an accumulator "
+        description="`clamp`: limit the integral sum to the output limits, before it is used. `clamp-sum`: the same for "
+        "an accumulator "
         "that also holds P on PV."
     )
 
@@ -160,7 +167,9 @@ class Integral(Model):
     """The integral term."""
 
     on: Literal["error", "none"] = Field(default="error", description="`error`, or `none`: no such term.")
-    rule: Rule = Field(description="Scan rule of the integral (specs/equations.md, section 4). `forward` adds this scan's error after the output.")
+    rule: Rule = Field(
+        description="Scan rule of the integral (specs/equations.md, section 4). `forward` adds this scan's error after the output."
+    )
     windup: Windup = Field(description="What happens to the integral at an output limit (specs/equations.md, section 5).")
 
 
@@ -168,14 +177,18 @@ class Filter(Model):
     """The filter that goes with the derivative."""
 
     applies_to: Literal["term", "lead-lag", "measurement", "output"] = Field(
-        description="`term`: the derivative term alone. `lead-lag` (series form): `(1 + Td s)/(1 + alpha Td s)`. `measurement`: the whole "
+        description="`term`: the derivative term alone. `lead-lag` (series form): `(1 + Td s)/(1 + alpha Td s)`. "
+        "`measurement`: the whole "
         "measurement path, P and I as well. `output`: the sum of the terms."
     )
     order: Literal[1, 2] = Field(
-        default=1, description="1: `1/(1 + Tf s)`. 2: Butterworth, `1/(1 + Tf s + Tf^2 s^2/2)`, on the measurement only."
+        default=1,
+        description="1: `1/(1 + Tf s)`. 2: Butterworth, `1/(1 + Tf s + Tf^2 s^2/2)`, on the measurement only.",
     )
     ratio: SettingName | Number | None = Field(
-        default=None, description="`Tf` as a multiple of the derivative dial's time: a number, or the name of a setting. Exactly one of `ratio`, `gain`, `time`."
+        default=None,
+        description="`Tf` as a multiple of the derivative dial's time: a number, or the name of a setting. Exactly one "
+        "of `ratio`, `gain`, `time`.",
     )
     gain: SettingName | Number | None = Field(
         default=None, description="Derivative gain N, the inverse of `ratio`: a number, or the name of a setting."
@@ -183,10 +196,13 @@ class Filter(Model):
     time: SettingName | Number | None = Field(default=None, description="`Tf` itself: seconds, or the name of a setting.")
     of: Literal["derivative", "effective-derivative"] = Field(
         default="derivative",
-        description="The time that `ratio` or `gain` refers to: the derivative setting, or `Ti Td/(Ti + Td)`, the derivative time of the "
+        description="The time that `ratio` or `gain` refers to: the derivative setting, or `Ti Td/(Ti + Td)`, the "
+        "derivative time of the "
         "equivalent standard form.",
     )
-    rule: Rule | None = Field(default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule.")
+    rule: Rule | None = Field(
+        default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."
+    )
 
 
 class Derivative(Model):
@@ -196,11 +212,13 @@ class Derivative(Model):
         description="What the term acts on: `error` (c = 1), `pv` (c = 0), `weighted` (c = `weight`), or `none`: no such term."
     )
     weight: SettingName | Number | None = Field(
-        default=None, description="Setpoint weight c where `on: weighted`: a number, or the name of the setting that holds it."
+        default=None,
+        description="Setpoint weight c where `on: weighted`: a number, or the name of the setting that holds it.",
     )
     rule: Rule = Field(
         default=Rule.BACKWARD,
-        description="Scan rule of the filtered derivative (specs/equations.md, section 4). Without a filter the derivative is the backward difference.",
+        description="Scan rule of the filtered derivative (specs/equations.md, section 4). Without a filter the "
+        "derivative is the backward difference.",
     )
     filter: Filter | None = Field(default=None, description="The filter; none if absent.")
 
@@ -209,7 +227,8 @@ class Transfer(Model):
     """What happens when the controller is put into automatic."""
 
     start: Literal["bumpless", "load-output"] = Field(
-        description="`bumpless`: the first automatic output equals the last output, `I = u - P - D`. `load-output`: the integral sum is "
+        description="`bumpless`: the first automatic output equals the last output, `I = u - P - D`. `load-output`: the "
+        "integral sum is "
         "loaded with the last output and the terms come on top, a bump of `P + D`."
     )
     derivative: Literal["running", "restarted"] = Field(
@@ -225,17 +244,25 @@ class Setting(Model):
         "gain", "multiplier", "integral", "derivative", "filter-time", "filter-ratio", "filter-gain",
         "proportional-weight", "derivative-weight", "tracking-time",
     ] = Field(description="What the dial sets (specs/equations.md, section 1).")  # fmt: skip
-    unit: Text = Field(description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`.")
+    unit: Text = Field(
+        description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`."
+    )
     about: Text | None = Field(default=None, description="The vendor's own name or words for it.")
     default: Number | None = Field(
         default=None,
-        description="Value taken when the setting is not given. Either the vendor's delivered value (then with evidence), or the value that "
+        description="Value taken when the setting is not given. Either the vendor's delivered value (then with "
+        "evidence), or the value that "
         "switches the term off, or leaves it as it is.",
     )
-    range: tuple[Number, Number] | None = Field(default=None, description="Smallest and largest value, in `unit`; off values may lie outside.")
-    off: Number | list[Number] | None = Field(default=None, description="Value, or values, that switch the term off; the first is used in conversions.")
+    range: tuple[Number, Number] | None = Field(
+        default=None, description="Smallest and largest value, in `unit`; off values may lie outside."
+    )
+    off: Number | list[Number] | None = Field(
+        default=None, description="Value, or values, that switch the term off; the first is used in conversions."
+    )
     scope: Literal["loop", "module"] = Field(
-        default="loop", description="`module`: a setting that many loops share; conversions leave it at its default unless told otherwise."
+        default="loop",
+        description="`module`: a setting that many loops share; conversions leave it at its default unless told otherwise.",
     )
     resolution: Annotated[float, Field(gt=0)] | None = Field(default=None, description="Smallest step of the dial, in `unit`.")
 
@@ -265,7 +292,8 @@ class Action(Model):
 
     reverse: Literal["sp - pv", "pv - sp"] = Field(
         default="sp - pv",
-        description="The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` means the vendor writes the "
+        description="The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` "
+        "means the vendor writes the "
         "direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all the same.",
     )
     names: dict[Literal["reverse", "direct"], Text] = Field(
@@ -283,7 +311,9 @@ class Scan(Model):
 class Output(Model):
     """Output."""
 
-    limits: tuple[Number, Number] = Field(description="Output limits used when none are given: % of span, or engineering units with `signals: engineering`.")
+    limits: tuple[Number, Number] = Field(
+        description="Output limits used when none are given: % of span, or engineering units with `signals: engineering`."
+    )
 
 
 class Quirk(Model):
@@ -308,7 +338,10 @@ class Example(Model):
 
     given: dict[str, str | Number] = Field(description="Settings and options by name.")
     canonical: Canonical = Field(description="The equivalent parallel gains of the feedback path, to six digits.")
-    source: Text | None = Field(default=None, description="Key of an entry under `sources`, where the example is printed; absent if it is our own arithmetic.")
+    source: Text | None = Field(
+        default=None,
+        description="Key of an entry under `sources`, where the example is printed; absent if it is our own arithmetic.",
+    )
     at: Text | None = Field(default=None, description="Place in the source.")
     note: Text | None = Field(default=None, description="What the example shows.")
 
@@ -317,14 +350,16 @@ class Equation(Model):
     """The fields of a card that make its equation; options overlay them."""
 
     signals: Literal["percent", "engineering"] = Field(
-        default="percent", description="Whether the controller computes in percent of span or in engineering units, so that its gains carry them."
+        default="percent",
+        description="Whether the controller computes in percent of span or in engineering units, so that its gains carry them.",
     )
     form: Form = Field(
         description="`parallel`: `kp + ki/s + kd s`. `standard` (ideal, ISA): `K (1 + 1/(Ti s) + Td s)`. `series` (interacting): "
         "`K (1 + 1/(Ti s)) (1 + Td s)`."
     )
     implementation: Literal["positional", "velocity"] = Field(
-        description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the last limited output."
+        description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the "
+        "last limited output."
     )
     proportional: Proportional = Field(description="The proportional term.")
     integral: Integral = Field(description="The integral term.")
@@ -347,7 +382,8 @@ class CardFile(Equation):
     sources: dict[Text, Source] = Field(description="What the card rests on, by a short key.")
     options: dict[SettingName, Option] = Field(default={}, description="What the vendor lets you choose per loop.")
     evidence: dict[Text, Evidence] = Field(
-        description="Where each statement comes from: a path in the card, such as `derivative.filter` or `options.FORM.choices.Series`, "
+        description="Where each statement comes from: a path in the card, such as `derivative.filter` or "
+        "`options.FORM.choices.Series`, "
         "covers everything below it; the longest path wins."
     )
     quirks: list[Quirk] = Field(default=[], description="Facts worth knowing that the equation does not show.")

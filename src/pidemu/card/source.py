@@ -95,9 +95,7 @@ class _Reader:
         self.events: Any = None
 
     def fail(self, mark: Any, message: str, width: int = 1) -> None:
-        self.problems.append(
-            Problem(self.document.path, mark.line + 1, mark.column + 1, message, width, self.document.lines)
-        )
+        self.problems.append(Problem(self.document.path, mark.line + 1, mark.column + 1, message, width, self.document.lines))
 
     def place(self, event: Any) -> Place:
         start, end = event.start_mark, event.end_mark
@@ -185,7 +183,7 @@ def parse(text: str, path: str) -> Document:
         message = f"not YAML: {error.problem or error.context}"
         reader.problems.append(Problem(path, line, column, message, 1, document.lines))
     except yaml.reader.ReaderError as error:
-        before = text[: error.position] if isinstance(error.position, int) else ""
+        before = text.encode()[: error.position].decode(errors="ignore")  # the parser counts bytes
         code = error.character if isinstance(error.character, int) else ord(error.character)
         line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
         message = f"character U+{code:04X} is not allowed in YAML; remove it"
@@ -196,9 +194,7 @@ def parse(text: str, path: str) -> Document:
         reader.problems.append(Problem(path, line, column, "half a Unicode pair; remove it", 1, document.lines))
     if not reader.problems and not isinstance(document.value, dict):
         kind = "empty" if document.value is None else "not a mapping"
-        reader.problems.append(
-            Problem(path, 1, 1, f"the file is {kind}; a card starts with 'card: 1'", 1, document.lines)
-        )
+        reader.problems.append(Problem(path, 1, 1, f"the file is {kind}; a card starts with 'card: 1'", 1, document.lines))
     if reader.problems:
         raise CardError(sorted(reader.problems))
     return document
@@ -227,5 +223,3 @@ def parse_file(file: Path, shown: str | None = None) -> Document:
         raise CardError([Problem(name, line, 1, "not UTF-8 text; save the file as UTF-8")]) from None
     except OSError as error:
         raise CardError([Problem(name, 1, 1, f"cannot be read: {error.strerror}")]) from None
-
-

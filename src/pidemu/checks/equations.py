@@ -14,8 +14,13 @@ from pidemu.settings import limits, off_values
 from pidemu.units import Dimension, Role, check_unit, parse_quantity, parse_unit
 
 _NEUTRAL: Final = {
-    "multiplier": 1.0, "proportional-weight": 1.0, "derivative-weight": 1.0, "filter-time": 0.0, "filter-ratio": 0.0, "derivative": 0.0,
-}  # fmt: skip
+    "multiplier": 1.0,
+    "proportional-weight": 1.0,
+    "derivative-weight": 1.0,
+    "filter-time": 0.0,
+    "filter-ratio": 0.0,
+    "derivative": 0.0,
+}
 
 
 def reject_bad_units(variant: Variant) -> Iterator[Problem]:
@@ -59,7 +64,9 @@ def reject_unexplained_defaults(variant: Variant) -> Iterator[Problem]:
         home = variant.home(("settings", name, "default"))
         key = variant.card.evidence_key(home) or ""
         if name not in key.split("."):
-            yield variant.card.document.problem(home, f"default {s.default:g} needs evidence of its own, at '{dotted(home)}' or '{dotted(home[:-1])}'")
+            yield variant.card.document.problem(
+                home, f"default {s.default:g} needs evidence of its own, at '{dotted(home)}' or '{dotted(home[:-1])}'"
+            )
 
 
 def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
@@ -85,7 +92,9 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
         if needed and not dials:
             yield document.problem(("settings",), f"no setting sets the {role}", at_key=True)
         if len(dials) > 1:
-            yield document.problem(variant.home(("settings", dials[1])), f"'{dials[0]}' and '{dials[1]}' both set the {role}", at_key=True)
+            yield document.problem(
+                variant.home(("settings", dials[1])), f"'{dials[0]}' and '{dials[1]}' both set the {role}", at_key=True
+            )
 
 
 def reject_bad_references(variant: Variant) -> Iterator[Problem]:
@@ -154,7 +163,12 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
     if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
         place = variant.home(("proportional", "accumulated"))
         yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
-    if scheme == "clamp-sum" and equation.implementation == "positional" and equation.proportional.on == "pv" and not equation.proportional.accumulated:
+    if (
+        scheme == "clamp-sum"
+        and equation.implementation == "positional"
+        and equation.proportional.on == "pv"
+        and not equation.proportional.accumulated
+    ):
         yield document.problem(home, "clamp-sum with P on pv needs 'proportional.accumulated: true'", at_key=True)
 
 
@@ -172,7 +186,8 @@ def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
     else:
         falls = (example.pv > example.sp) == (words[example.name] == "reverse")
         if falls != (example.output == "falls"):
-            message = f"with {words[example.name]} action the output {'falls' if falls else 'rises'}, the example says it {example.output}"
+            true = "falls" if falls else "rises"
+            message = f"with {words[example.name]} action the output {true}, the example says it {example.output}"
             yield variant.card.document.problem(home, message, at_key=True)
 
 

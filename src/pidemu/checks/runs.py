@@ -29,10 +29,18 @@ def reject_wrong_examples(card: Card) -> Iterator[Problem]:
             continue
         kp = n1 - n0 * d1
         found = {"kp": kp, "ki": n0, "kd": n2 - kp * d1, "Tf": d1}
-        stated = {"kp": example.canonical.kp, "ki": example.canonical.ki, "kd": example.canonical.kd, "Tf": example.canonical.Tf}
+        stated = {
+            "kp": example.canonical.kp,
+            "ki": example.canonical.ki,
+            "kd": example.canonical.kd,
+            "Tf": example.canonical.Tf,
+        }
         for name, value in found.items():
             if not math.isclose(stated[name], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-9):
-                yield card.document.problem(("examples", i, "canonical", name), f"{name} is {stated[name]:g}, the settings amount to {value:.6g}")
+                yield card.document.problem(
+                    ("examples", i, "canonical", name),
+                    f"{name} is {stated[name]:g}, the settings amount to {value:.6g}",
+                )
 
 
 def reject_unrunnable(card: Card) -> Iterator[Problem]:

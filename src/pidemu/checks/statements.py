@@ -18,7 +18,9 @@ def reject_wrong_folder(card: Card) -> Iterator[Problem]:
     slug = re.sub(r"[^a-z0-9]+", "-", card.data.vendor.lower()).strip("-")
     folder = card.id.split("/")[0]
     if slug != folder:
-        yield card.document.problem(("vendor",), f"vendor '{card.data.vendor}' belongs in folder '{slug}', the card is in '{folder}'")
+        yield card.document.problem(
+            ("vendor",), f"vendor '{card.data.vendor}' belongs in folder '{slug}', the card is in '{folder}'"
+        )
 
 
 def reject_dangling_sources(card: Card) -> Iterator[Problem]:
@@ -33,17 +35,20 @@ def reject_unused_sources(card: Card) -> Iterator[Problem]:
     used = {key for _, key in _source_references(card)}
     for key in card.data.sources:
         if key not in used:
-            yield card.document.problem(("sources", key), f"source '{key}' is not used by any evidence, quirk or example", at_key=True)
+            yield card.document.problem(
+                ("sources", key), f"source '{key}' is not used by any evidence, quirk or example", at_key=True
+            )
 
 
 def _source_references(card: Card) -> Iterator[tuple[Path_, str]]:
     for key, evidence in card.data.evidence.items():
         if evidence.source is not None:
             yield ("evidence", key, "source"), evidence.source
-    for part, items in (("quirks", card.data.quirks), ("examples", card.data.examples)):
-        for i, item in enumerate(items):
-            if item.source is not None:
-                yield (part, i, "source"), item.source
+    mentions = [("quirks", i, q.source) for i, q in enumerate(card.data.quirks)]
+    mentions += [("examples", i, e.source) for i, e in enumerate(card.data.examples)]
+    for part, i, source in mentions:
+        if source is not None:
+            yield (part, i, "source"), source
 
 
 def reject_incomplete_evidence(card: Card) -> Iterator[Problem]:
@@ -74,7 +79,9 @@ def reject_fields_without_evidence(card: Card) -> Iterator[Problem]:
         for path in leaves(variant.raw):
             home = variant.home(path)
             if home not in seen and card.evidence_key(home) is None:
-                yield card.document.problem(home, f"no evidence covers '{dotted(home)}'; add it under evidence, if only as assumed", at_key=True)
+                yield card.document.problem(
+                    home, f"no evidence covers '{dotted(home)}'; add it under evidence, if only as assumed", at_key=True
+                )
             seen.add(home)
     for name in card.data.options:
         if card.evidence_key(("options", name, "default")) is None:

@@ -18,7 +18,10 @@ from pidemu.errors import CardError
 @vendors_option
 @json_option
 def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
-    """List the cards whose id or title holds WORD, with how many of their statements are documented, measured, inferred or assumed."""
+    """List the cards whose id or title holds WORD.
+
+    Beside each: how many of its statements are documented, measured, inferred or assumed.
+    """
     rows: list[Card] = []
     broken: list[str] = []
     for card_id, file in card_files(vendors).items():

@@ -13,7 +13,13 @@ from pidemu.emulator import Controller
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--lang", type=click.Choice(["python"]), default="python", show_default=True, help="Language.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
-@click.option("--action", type=click.Choice(["reverse", "direct"]), default="reverse", show_default=True, help="Reverse: the output falls when PV rises.")
+@click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    default="reverse",
+    show_default=True,
+    help="Reverse: the output falls when PV rises.",
+)
 @click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
 @vendors_option
 def command(

@@ -18,7 +18,10 @@ from pidemu.errors import SettingError
 F = TypeVar("F", bound=Callable[..., Any])
 
 vendors_option = click.option(
-    "--vendors", multiple=True, metavar="DIR", help="A folder of your own cards, <vendor>/<block>.yaml; searched first. Repeatable."
+    "--vendors",
+    multiple=True,
+    metavar="DIR",
+    help="A folder of your own cards, <vendor>/<block>.yaml; searched first. Repeatable.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 

@@ -22,7 +22,7 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
-from pidemu.conversion.certificate import Band, Certificate, PathComparison
+from pidemu.conversion.certificate import EXACT, Band, Certificate, PathComparison
 from pidemu.conversion.convert import MATCHES, Conversion, convert
 from pidemu.conversion.loopfile import read_loop
 from pidemu.errors import ConversionRefusedError
@@ -40,10 +40,20 @@ _VERDICTS = {
 @click.argument("card", required=False)
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--to", "target", metavar="CARD", help="The card to convert to.")
-@click.option("--set", "fixed", multiple=True, metavar="NAME=VALUE", help="An option of the target, or a dial that shall have this value. Repeatable.")
+@click.option(
+    "--set",
+    "fixed",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An option of the target, or a dial that shall have this value. Repeatable.",
+)
 @click.option("--loop", "loop_file", metavar="FILE.yaml", help="Read source, settings and target from a file instead.")
 @click.option("--scan", type=Scan(), help="Scan interval of both, or of source and target [s].")
-@click.option("--match", type=click.Choice(list(MATCHES)), help="How to match; by default exact where possible, else low-frequency.")
+@click.option(
+    "--match",
+    type=click.Choice(list(MATCHES)),
+    help="How to match; by default exact where possible, else low-frequency.",
+)
 @click.option("--allow-approximate", is_flag=True, help="Where the target refuses, give the nearest settings.")
 @click.option("--round", "round_dials", is_flag=True, help="Round to the target's resolution and state the effect.")
 @click.option("--pv-range", type=Pair(), help="Measurement range of the source [engineering units].")
@@ -71,8 +81,8 @@ def command(
 ) -> None:
     """Convert the settings NAME=VALUE of CARD to another card.
 
-    Values are numbers in the card's unit, or have one: "RESET=20 s/repeat". Prints the target's settings, how near the two controllers
-    are, and what will behave differently. Exit status 1 if the target refuses.
+    Values are numbers in the card's unit, or have one: "RESET=20 s/repeat". Prints the target's settings, how near the two
+    controllers are, and what will behave differently. Exit status 1 if the target refuses.
     """
     given = assignments(values)
     wanted = assignments(fixed, "NAME=VALUE after --set")
@@ -82,7 +92,9 @@ def command(
         target, wanted = target or loop.to, {**loop.set, **wanted}
         scan = scan or loop.scan
     if card is None:
-        raise click.UsageError("no CARD to convert from; for example: pidemu convert fisher/provox GAIN=2 RESET=4 --to emerson/deltav")
+        raise click.UsageError(
+            "no CARD to convert from; for example: pidemu convert fisher/provox GAIN=2 RESET=4 --to emerson/deltav"
+        )
     if target is None:
         raise click.UsageError("no card to convert to; add --to CARD, 'pidemu cards' lists them")
     ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
@@ -131,7 +143,13 @@ def _print(c: Conversion) -> None:
     _textbook(c)
     _list("Watch for", c.warnings)
     _list("Read as", (*c.source.notes, *c.settings.notes))
-    _list("Rests on assumptions", c.assumptions)
+    _list("These settings rest on what nobody says", c.law_assumptions)
+    others = len(c.assumptions) - len(c.law_assumptions)
+    if others:
+        _wrap(
+            f"{others} more assumptions concern scan rules, limits and transfers: 'pidemu show' and --json list them.",
+            "  ",
+        )
 
 
 def _chosen(s: Settings) -> str:
@@ -177,22 +195,30 @@ def _target(c: Conversion) -> None:
 def _figures(c: Certificate) -> None:
     rows = [*_rows("feedback (PV)", c.feedback), *_rows("setpoint", c.setpoint)]
     if c.feedback_at_scan is not None and c.setpoint_at_scan is not None:
-        rows += [*_rows("feedback, at the scans", c.feedback_at_scan), *_rows("setpoint, at the scans", c.setpoint_at_scan)]
+        rows += [
+            *_rows("feedback, at the scans", c.feedback_at_scan),
+            *_rows("setpoint, at the scans", c.setpoint_at_scan),
+        ]
     table(["path", "band", "rad/s", "deviation", "gain", "phase"], rows, right=(3, 4, 5))
     kick = c.setpoint_kick
-    click.echo(f"  setpoint kick (output step per setpoint step, at once): {number(kick.source)} on the source, {number(kick.target)} on the target")
+    click.echo(
+        "  setpoint kick (output step per setpoint step, at once): "
+        f"{number(kick.source)} on the source, {number(kick.target)} on the target"
+    )
 
 
 def _rows(title: str, p: PathComparison) -> list[list[str]]:
     out = []
     for name, band in (("loop band", p.loop_band), ("full band", p.full_band)):
-        out.append([title, name, f"{number(band.low)} to {number(band.high)}", _percent(band.max_deviation), _db(band), _deg(band)])
+        out.append([title, name, f"{band.low:.3g} to {band.high:.3g}", _percent(band.max_deviation), _db(band), _deg(band)])
         title = ""
     return out
 
 
 def _percent(deviation: float) -> str:
-    return "none" if deviation < 1e-9 else f"{100 * deviation:.2g} %" if deviation < 10 else "over 1000 %"
+    if deviation < EXACT:
+        return "none"
+    return f"{number(float(f'{100 * deviation:.2g}'))} %" if deviation < 10 else "over 1000 %"
 
 
 def _db(band: Band) -> str:
@@ -218,9 +244,13 @@ def _textbook(c: Conversion) -> None:
     book = c.textbook
     if book.certificate is None:
         _wrap(f"the textbook rule has no answer: {book.reason}", "  ")
+    elif c.match != "textbook" and book.certificate.feedback.loop_band.max_deviation < EXACT:
+        click.echo("  the textbook rule gives the same law for measurement")
     elif c.match != "textbook":
         band = book.certificate.feedback.loop_band
-        click.echo(f"  the textbook rule would deviate by {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band (feedback)")
+        click.echo(
+            f"  the textbook rule would deviate by {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band, feedback"
+        )
 
 
 def _list(title: str, items: tuple[str, ...]) -> None:

@@ -17,13 +17,36 @@ from pidemu.records import Record, read_record, write_record
 @click.command("run", short_help="Run a card on recorded signals.")
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
-@click.option("--record", "file", required=True, metavar="FILE.csv", help="Recorded signals: columns sp, pv and, if there are, auto, manual, output.")
+@click.option(
+    "--record",
+    "file",
+    required=True,
+    metavar="FILE.csv",
+    help="Recorded signals: columns sp, pv and, if there are, auto, manual, output.",
+)
 @click.option("--scan", type=float, metavar="H", help="Scan interval of record and controller [s]; by default the card's.")
-@click.option("--action", type=click.Choice(["reverse", "direct"]), default="reverse", show_default=True, help="Reverse: the output falls when PV rises.")
+@click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    default="reverse",
+    show_default=True,
+    help="Reverse: the output falls when PV rises.",
+)
 @click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
 @click.option("--bias", type=float, default=0.0, help="Output at zero error of a positional controller without integral action.")
-@click.option("--initial-output", type=float, default=None, help="Output before the first scan; by default the first recorded one, else 0.")
-@click.option("-o", "--output", "target", metavar="FILE.csv", help="Where to write the record with the new column; by default to the screen.")
+@click.option(
+    "--initial-output",
+    type=float,
+    default=None,
+    help="Output before the first scan; by default the first recorded one, else 0.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "target",
+    metavar="FILE.csv",
+    help="Where to write the record with the new column; by default to the screen.",
+)
 @vendors_option
 def command(
     card: str,

@@ -62,7 +62,10 @@ def _facts(variant: Variant) -> None:
     rows = [
         ["form", q.form.value],
         ["implementation", q.implementation],
-        ["integral", f"{q.integral.rule.value}, windup: {q.integral.windup.scheme}" if q.integral.on != "none" else "none"],
+        [
+            "integral",
+            f"{q.integral.rule.value}, windup: {q.integral.windup.scheme}" if q.integral.on != "none" else "none",
+        ],
         ["derivative", q.derivative.rule.value if q.derivative.on != "none" else "none"],
         ["to automatic", start[q.transfer.start]],
         ["action", f"reverse (output falls when PV rises) is called '{words['reverse']}', direct '{words['direct']}'"],
@@ -105,13 +108,15 @@ def _evidence(variant: Variant) -> None:
     if assumed:
         heading("\nAssumed - nobody says so, and results rest on it")
         for a in assumed:
-            _wrapped(f"{a.path} = {a.value}" + (f": {a.evidence.note}" if a.evidence and a.evidence.note else ""), "  - ")
+            _wrapped(str(a), "  - ")
 
 
 def _rest(card: Card) -> None:
     heading("\nSources")
     for key, s in card.data.sources.items():
-        _wrapped(f"[{key}] {s.title}" + (f", {s.address}" if s.address else "") + f" (read {s.read})" + (f". {s.note}" if s.note else ""))
+        _wrapped(
+            f"[{key}] {s.title}" + (f", {s.address}" if s.address else "") + f" (read {s.read})" + (f". {s.note}" if s.note else "")
+        )
     if card.data.quirks:
         heading("\nQuirks")
         for quirk in card.data.quirks:

@@ -46,14 +46,14 @@ def _ranges(c: Conversion) -> Iterator[str]:
 
 def _setpoint(c: Conversion) -> Iterator[str]:
     kick = c.certificate.setpoint_kick
-    if c.certificate.setpoint.is_exact or c.verdict == "approximate" and _alike(kick.source, kick.target):
+    if c.certificate.setpoint.is_exact or (c.verdict == "approximate" and _alike(kick.source, kick.target)):
         return
     if math.isinf(kick.source) or math.isinf(kick.target):
         who = c.source.card.id if math.isinf(kick.source) else c.settings.card.id
         other = kick.target if math.isinf(kick.source) else kick.source
         if not (math.isinf(kick.source) and math.isinf(kick.target)):
             yield (
-                f"a setpoint step spikes the output of {who} for one scan (unfiltered derivative on the error), the other controller "
+                f"a setpoint step spikes the output of {who} for one scan (unfiltered derivative on the error), the other "
                 f"moves by {other:.4g} % per % at once"
             )
             return
@@ -91,7 +91,10 @@ def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
         )
     if old.transfer.start != new.transfer.start:
         bumps = target if new.transfer.start == "load-output" else source
-        yield f"transfer to automatic: {bumps.card.id} loads the output into the integral and bumps by its other terms, the other does not"
+        yield (
+            f"transfer to automatic: {bumps.card.id} loads the output into the integral and bumps by its other terms, "
+            "the other controller does not"
+        )
     if old.output.limits != new.output.limits and old.signals == new.signals:
         low, high = ("{:g} to {:g}".format(*e.output.limits) for e in (old, new))
         yield f"default output limits differ: {low} on the source, {high} on the target"

@@ -153,8 +153,8 @@ class Certificate:
 def time_scale(law: Law) -> float:
     """Return the effective integral time ``m1/m0`` that places the loop band [s] (section 9).
 
-    Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the integral gain,
-    and for proportional action alone, which has no time scale, one second.
+    Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the
+    integral gain, and for proportional action alone, which has no time scale, one second.
     """
     m0, m1, m2 = law.moments()
     if m0:
@@ -173,7 +173,7 @@ def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[floa
         The longer scan interval [s], whose Nyquist frequency ends both bands.
     """
     Ti = time_scale(law)
-    m0, m1, m2 = law.moments()
+    _, m1, m2 = law.moments()
     Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
     nyquist = math.pi / scan if scan is not None else math.inf
     low = 0.01 / Ti
@@ -193,7 +193,12 @@ def compare(source: Response, target: Response, w: npt.NDArray[np.float64]) -> B
         phase = np.abs(np.degrees(np.angle(ratio)))
     worst = int(np.argmax(deviation))
     return Band(
-        float(w[0]), float(w[-1]), float(deviation[worst]), float(np.nanmax(gain)), float(np.nanmax(np.nan_to_num(phase))), float(w[worst])
+        float(w[0]),
+        float(w[-1]),
+        float(deviation[worst]),
+        float(np.nanmax(gain)),
+        float(np.nanmax(np.nan_to_num(phase))),
+        float(w[worst]),
     )
 
 

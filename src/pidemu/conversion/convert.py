@@ -86,12 +86,14 @@ class Conversion:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What the result rests on without anybody having said so: fields of both cards that are only assumed."""
-        return tuple(
-            f"{s.card.id}: {a.path} = {a.value}" + (f" ({a.evidence.note})" if a.evidence and a.evidence.note else "")
-            for s in (self.source, self.settings)
-            for a in s.variant.assumptions()
-        )
+        """What the result rests on without anybody having said so; what makes the law first."""
+        found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
+        return tuple(text for a, text in found if a.makes_the_law) + tuple(text for a, text in found if not a.makes_the_law)
+
+    @property
+    def law_assumptions(self) -> tuple[str, ...]:
+        """Those of `assumptions` that the figures of the continuous law rest on."""
+        return tuple(f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json``."""
@@ -236,7 +238,7 @@ class _Work:
             return (*self._closed(match), "")
         except (NoMatchError, SettingError) as error:
             reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
-        numbers = nearest(self.law, self.algorithm, self.target, self.factor)
+        numbers = nearest(self.law, self.target, self.factor)
         if numbers is None:
             return None, "constrained", f"{reason}; no settings of it come near"
         try:
@@ -313,7 +315,9 @@ class _Work:
         b, c = closed.weights(self.scaled, self.target, settings.algorithm())
         if b is None and c is None:
             return settings
-        return self.target.settings(replace(numbers, b=self._in_range(Role.PROPORTIONAL_WEIGHT, b), c=self._in_range(Role.DERIVATIVE_WEIGHT, c)))
+        return self.target.settings(
+            replace(numbers, b=self._in_range(Role.PROPORTIONAL_WEIGHT, b), c=self._in_range(Role.DERIVATIVE_WEIGHT, c))
+        )
 
     def _in_range(self, role: Role, weight: float | None) -> float | None:
         dial = self.target.dial(role)
@@ -345,9 +349,7 @@ class _Work:
             before = certificate.feedback
             certificate = replace(self._certify(rounded), dials=dials, feedback_before_rounding=before if dials else None)
             settings = rounded
-        conversion = Conversion(
-            self.source, settings, how, certificate, self.textbook(), (), refusal, self.factor, self.scans
-        )
+        conversion = Conversion(self.source, settings, how, certificate, self.textbook(), (), refusal, self.factor, self.scans)
         return replace(conversion, warnings=tuple(warnings_for(conversion)))
 
 
@@ -366,6 +368,5 @@ def _rounded(settings: Settings) -> tuple[Settings, tuple[Rounded, ...]]:
                 dials.append(Rounded(name, value.value, new))
         values[name] = new
     ranges = {k: v for k, v in (("pv_range", settings.pv_range), ("op_range", settings.op_range)) if v is not None}
-    return settings.card.settings({**settings.options, **values, **ranges}), tuple(dials)
-
-
+    chosen = {o: c for o, c in settings.options.items() if o not in settings.defaulted}
+    return settings.card.settings({**chosen, **values, **ranges}), tuple(dials)

@@ -21,8 +21,12 @@ class LoopFile(Model):
     card: Text = Field(description="The card of the settings.")
     settings: dict[Text, str | Number] = Field(description="Settings and options by name.")
     to: Text | None = Field(default=None, description="The card to convert to.")
-    set_: dict[Text, str | Number] = Field(default={}, description="Options of the target, and dials that shall have a value.", alias="set")
-    scan: list[Number] | None = Field(default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s].")
+    set_: dict[Text, str | Number] = Field(
+        default={}, description="Options of the target, and dials that shall have a value.", alias="set"
+    )
+    scan: list[Number] | None = Field(
+        default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
+    )
 
 
 @dataclass(frozen=True, slots=True)

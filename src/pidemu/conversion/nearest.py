@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm import Algorithm
 from pidemu.card.models import Form
 from pidemu.conversion.certificate import bands
 from pidemu.conversion.target import Numbers, Target
@@ -24,18 +23,16 @@ _MARGIN: Final = 1e-9
 """Relative distance kept from a range's end, so that unit conversion does not step over it."""
 
 
-def nearest(law: Law, source: Algorithm, target: Target, factor: float) -> Numbers | None:
+def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
     """Return numbers inside the target's ranges that minimise the largest deviation over the loop band.
 
-    The low-frequency gain ``m0`` is kept as far as the ranges allow. The search is a grid in the logarithms of gain and derivative time that closes
-    in on its best point: it needs no derivative, is the same on every machine, and the problem has two unknowns.
+    The low-frequency gain ``m0`` is kept as far as the ranges allow. The search is a grid in the logarithms of gain and derivative
+    time that closes in on its best point: it needs no derivative, is the same on every machine, and there are two unknowns only.
 
     Parameters
     ----------
     law : Law
         The source's law.
-    source : Algorithm
-        The source.
     target : Target
         The target; its filter stays as it is.
     factor : float
@@ -56,7 +53,10 @@ def nearest(law: Law, source: Algorithm, target: Target, factor: float) -> Numbe
     gains = _clip((size * 1e-3, size * 1e3), _range(target, Role.GAIN))
     rates = _range(target, Role.INTEGRAL)
     times = _clip((scale * 1e-4, scale * 1e2), _range(target, Role.DERIVATIVE))
-    center, width = [_middle(gains), _middle(times)], [math.log(gains[1] / gains[0]) / 2, math.log(times[1] / times[0]) / 2]
+    center, width = (
+        [_middle(gains), _middle(times)],
+        [math.log(gains[1] / gains[0]) / 2, math.log(times[1] / times[0]) / 2],
+    )
     best: tuple[float, float, float, float] | None = None
     for _ in range(_ROUNDS):
         K = _axis(center[0], width[0], gains)[:, None]

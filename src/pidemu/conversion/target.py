@@ -125,6 +125,7 @@ class Target:
     ) -> None:
         self.card = card
         self.variant: Variant = card.variant(options)
+        self.options = dict(options)
         self.given = dict(given)
         self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
         self.spans = Spans(*(r[1] - r[0] if r else 100.0 for r in (pv_range, op_range)))
@@ -209,7 +210,7 @@ class Target:
         SettingError
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
-        return self.card.settings({**self.variant.chosen, **self.given, **self._dials(n), **self.ranges})
+        return self.card.settings({**self.options, **self.given, **self._dials(n), **self.ranges})
 
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
@@ -279,5 +280,3 @@ def _placeholder(setting: Setting) -> float:
     if low <= candidate <= high and candidate not in off_values(setting) and (candidate or setting.sets == "derivative"):
         return candidate or min(1.0, high)
     return low if low > 0 else high if math.isfinite(high) else 1.0
-
-

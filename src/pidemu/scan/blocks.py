@@ -176,14 +176,14 @@ def derivative(b: Builder, x: Expr, afresh: Expr, gain: float, Tf: float, h: flo
         return d
     match rule:
         case Rule.BACKWARD:
-            decay, g = Tf / (Tf + h), gain / (Tf + h)
+            decay, strength = Tf / (Tf + h), gain / (Tf + h)
         case Rule.FORWARD:
-            decay, g = 1 - h / Tf, gain / Tf
+            decay, strength = 1 - h / Tf, gain / Tf
         case Rule.TRAPEZOIDAL:
-            decay, g = (2 * Tf - h) / (2 * Tf + h), 2 * gain / (2 * Tf + h)
+            decay, strength = (2 * Tf - h) / (2 * Tf + h), 2 * gain / (2 * Tf + h)
     state = b.state("D", "derivative term")
     a = b.coefficient("D_decay", decay, "decay of the filtered derivative per scan", "-")
-    k = b.coefficient("D_gain", g, "kd over the filter's time", "-")
+    k = b.coefficient("D_gain", strength, "kd over the filter's time", "-")
     old = select(afresh, 0.0, state)
     b.let("D", a * old + k * (x - x1), f"derivative, Tf = {Tf:.6g} s, {rule.value} (section 4)")
     b.let("D", flushed(state), "no denormal numbers (section 7)")

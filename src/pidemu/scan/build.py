@@ -13,8 +13,8 @@ from pidemu.algorithm import Algorithm
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
 from pidemu.scan import blocks
-from pidemu.scan.blocks import Builder, select
-from pidemu.scan.program import Expr, Name, Program, equal
+from pidemu.scan.blocks import Builder
+from pidemu.scan.program import Expr, Name, Program, equal, select
 
 Action = Literal["reverse", "direct"]
 
@@ -92,7 +92,10 @@ def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float) -> 
         raise ScanError("a bias belongs to a positional controller without integral action; leave it out")
     if a.windup == "external-reset" and a.integral_rule is Rule.TRAPEZOIDAL and a.ki:
         raise ScanError("external-reset windup is defined for the backward and forward rules only")
-    for rule, Tf in [(a.derivative_rule, a.Tf if a.has_term_filter else 0), (a.filter_rule, a.Tf if a.has_signal_filter else 0)]:
+    for rule, Tf in [
+        (a.derivative_rule, a.Tf if a.has_term_filter else 0),
+        (a.filter_rule, a.Tf if a.has_signal_filter else 0),
+    ]:
         if rule is Rule.FORWARD and 0 < Tf <= h / 2:
             raise ScanError(
                 f"the filter time {Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
@@ -169,7 +172,16 @@ def _positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Ex
         I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
     v: Expr = b.let("v", _sum([P, I, t.D]), "sum of the terms")
     if a.has_signal_filter and a.filter_on == "output":
-        v = blocks.lag(b, v, equal(b.state("on", "automatic in the last scan", "-"), 0.0), a.Tf, h, a.filter_rule, a.filter_order, "v")
+        v = blocks.lag(
+            b,
+            v,
+            equal(b.state("on", "automatic in the last scan", "-"), 0.0),
+            a.Tf,
+            h,
+            a.filter_rule,
+            a.filter_order,
+            "v",
+        )
     out = b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")
     if holds_sum and a.ki:
         _after_output(b, a, h, v, out, grown)
@@ -202,9 +214,7 @@ def _gated(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr
     return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")
 
 
-def _start_and_grow(
-    b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr | None, moved: Expr | None
-) -> Expr:
+def _start_and_grow(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr | None, moved: Expr | None) -> Expr:
     """Set the integral at a transfer, let it grow otherwise (section 6)."""
     now = None if a.integral_rule is Rule.FORWARD else grown
     if a.load_output:
@@ -257,6 +267,15 @@ def _velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
         b.let("D1", t.D, "kept for the next scan")
     du: Expr = b.let("du", select(t.on, _sum(parts), 0.0), "increment; none at a transfer, bumpless (section 6)")
     if a.has_signal_filter and a.filter_on == "output":
-        du = blocks.lag(b, du, equal(b.state("on", "automatic in the last scan", "-"), 0.0), a.Tf, h, a.filter_rule, a.filter_order, "du")
+        du = blocks.lag(
+            b,
+            du,
+            equal(b.state("on", "automatic in the last scan", "-"), 0.0),
+            a.Tf,
+            h,
+            a.filter_rule,
+            a.filter_order,
+            "du",
+        )
     v = b.let("v", t.u + du, "last output and increment")
     return b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")

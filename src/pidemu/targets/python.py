@@ -11,6 +11,7 @@ from types import CodeType
 from typing import Any, Final
 
 from pidemu.scan.program import Binary, Expr, Name, Number, Program, Select
+from pidemu.scan.specialise import names_in, specialise
 
 _PRECEDENCE: Final = {
     "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
@@ -39,7 +40,7 @@ def _render(x: Expr) -> tuple[str, int]:
             return f"{then} if {test} else {_wrapped(no, _SELECT)}", _SELECT
         case Binary(operator=operator, left=left, right=right):
             level = _PRECEDENCE[operator]
-            strict = level + 1 if level != 2 and level != 1 else level
+            strict = level + 1 if level > 2 else level
             return f"{_wrapped(left, level)} {operator} {_wrapped(right, strict)}", level
     raise TypeError(f"no Python for {type(x).__name__}")
 
@@ -57,6 +58,39 @@ def _body(program: Program, indent: str) -> list[str]:
     return lines
 
 
+def _scan(program: Program) -> list[str]:
+    states = ", ".join(q.name for q in program.states)
+    return [
+        f"def scan(state, {', '.join(q.name for q in program.inputs)}):",
+        '    """Do one scan; change `state` and return the output."""',
+        f"    {states} = state",
+        *_body(program, "    "),
+        f"    state[:] = {states}",
+        f"    return {program.output}",
+    ]
+
+
+def _run(program: Program, name: str, *, fast: bool = False) -> list[str]:
+    """Return the function for many scans; `fast`: with the coefficients as local names, which are quicker to reach."""
+    states = ", ".join(q.name for q in program.states)
+    signals = ", ".join(f"{q.name}_n" for q in program.inputs)
+    arguments = ", ".join(q.name for q in program.inputs)
+    used = {n for assign in program.body for n in names_in(assign.value)}
+    local = "".join(f", {q.name}={q.name}" for q in program.coefficients if q.name in used)
+    loop = f"for {arguments} in zip({signals}, strict=True):" if len(program.inputs) > 1 else f"for {arguments} in {signals}:"
+    return [
+        f"def {name}(state, {signals}{local if fast else ''}):",
+        '    """Do one scan per sample of the signals; change `state` and return the outputs."""',
+        f"    {states} = state",
+        "    outputs = []",
+        f"    {loop}",
+        *_body(program, "        "),
+        f"        outputs.append({program.output})",
+        f"    state[:] = {states}",
+        "    return outputs",
+    ]
+
+
 def source(program: Program) -> str:
     """Return a module that runs the program: its coefficients, `scan` for one scan and `run` for many.
 
@@ -65,35 +99,20 @@ def source(program: Program) -> str:
     program : Program
         What to print.
     """
-    arguments = ", ".join(q.name for q in program.inputs)
-    states = ", ".join(q.name for q in program.states)
     lines = [f'"""{program.title}"""', ""]
     for quantity, value in zip(program.coefficients, program.values, strict=True):
         lines.append(f"{quantity.name} = {_literal(value):<24}  # {quantity.text} [{quantity.unit}]")
     lines += ["", "# kept from scan to scan"]
-    for quantity, value in zip(program.states, program.initial, strict=True):
+    for quantity in program.states:
         lines.append(f"#   {quantity.name:<12} {quantity.text} [{quantity.unit}]")
     lines += [
         f"INITIAL = [{', '.join(_literal(v) for v in program.initial)}]",
         "",
         "",
-        f"def scan(state, {arguments}):",
-        '    """Do one scan; change `state` and return the output."""',
-        f"    {states} = state",
-        *_body(program, "    "),
-        f"    state[:] = {states}",
-        f"    return {program.output}",
+        *_scan(program),
         "",
         "",
-        f"def run(state, {', '.join(f'{q.name}_n' for q in program.inputs)}):",
-        '    """Do one scan per sample of the signals; change `state` and return the outputs."""',
-        f"    {states} = state",
-        "    outputs = []",
-        f"    for {arguments} in zip({', '.join(f'{q.name}_n' for q in program.inputs)}, strict=True):",
-        *_body(program, "        "),
-        f"        outputs.append({program.output})",
-        f"    state[:] = {states}",
-        "    return outputs",
+        *_run(program, "run"),
     ]
     return "\n".join(lines) + "\n"
 
@@ -108,10 +127,13 @@ class Compiled:
         ``scan(state, sp, pv, auto, manual) -> u``.
     run : callable
         ``run(state, sp, pv, auto, manual) -> list of u``, over sequences.
+    run_automatic : callable
+        ``run_automatic(state, sp, pv) -> list of u``: the same for scans after the first automatic one.
     """
 
     scan: Callable[[list[float], float, float, float, float], float]
     run: Callable[[list[float], Sequence[float], Sequence[float], Sequence[float], Sequence[float]], list[float]]
+    run_automatic: Callable[[list[float], Sequence[float], Sequence[float]], list[float]]
 
 
 @lru_cache(maxsize=256)
@@ -124,8 +146,14 @@ def compiled(program: Program) -> Compiled:
 
     The functions' text does not hold the coefficients, so loops that share a structure share the compiled code.
     """
+    lines = [*_scan(program), *_run(program, "run", fast=True), *_run(specialise(program), "run_automatic", fast=True)]
+    text = "\n".join(
+        [
+            f"def bind({', '.join(q.name for q in program.coefficients)}):",
+            *("    " + re.sub(r"  +# .*", "", line) for line in lines),
+            "    return scan, run, run_automatic",
+        ]
+    )
     names: dict[str, Any] = {}
-    functions = re.sub(r"\A.*?(?=^def scan)", "", source(program), flags=re.DOTALL | re.MULTILINE)
-    exec(_code(re.sub(r"  +# .*", "", functions)), names)  # our own text: nothing of the user's goes into it
-    names.update((q.name, v) for q, v in zip(program.coefficients, program.values, strict=True))
-    return Compiled(names["scan"], names["run"])
+    exec(_code(text), names)  # our own text: nothing of the user's goes into it
+    return Compiled(*names["bind"](*program.values))

@@ -1,0 +1,95 @@
+"""A program with some names known beforehand: what needs no deciding is decided once, not every scan.
+
+In a long spell in automatic the mode and the start flags never change. The specialised program does the same arithmetic in the same
+order, so its bits are the same; only selects on what is known, copies and unused assignments go.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Final
+
+from pidemu.scan.program import Assign, Binary, Expr, Name, Number, Program, Select
+
+IN_AUTOMATIC: Final[Mapping[str, float]] = {"auto": 1.0, "on": 1.0, "begun": 1.0}
+"""What holds from the second automatic scan on."""
+
+_COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
+    "<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge, "==": operator.eq, "!=": operator.ne,
+}  # fmt: skip
+
+
+def specialise(program: Program, known: Mapping[str, float] = IN_AUTOMATIC) -> Program:
+    """Return the program for scans in which inputs and states have known values that they keep.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    known : mapping
+        Value by name of input or state.
+    """
+    environment: dict[str, Expr] = {name: Number(value) for name, value in known.items()}
+    kept: list[Assign] = []
+    for assign in program.body:
+        value = _fold(assign.value, environment)
+        for name in [n for n, e in environment.items() if isinstance(e, Name) and e.id == assign.name]:
+            del environment[name]  # what it stood for changes
+        if isinstance(value, Name) and value.id == assign.name:
+            continue
+        if isinstance(value, Number | Name):
+            environment[assign.name] = value
+        else:
+            environment.pop(assign.name, None)
+        if not (isinstance(value, Number) and known.get(assign.name) == value.value):
+            kept.append(replace(assign, value=value))
+    live = {q.name for q in program.states} | {program.output}
+    body: list[Assign] = []
+    for assign in reversed(kept):
+        if assign.name in live:
+            live.discard(assign.name)
+            live.update(names_in(assign.value))
+            body.append(assign)
+    inputs = tuple(q for q in program.inputs if q.name in ("sp", "pv"))
+    return replace(program, inputs=inputs, body=tuple(reversed(body)))
+
+
+def _fold(x: Expr, environment: Mapping[str, Expr]) -> Expr:
+    match x:
+        case Name(id=name):
+            return environment.get(name, x)
+        case Select(condition=condition, yes=yes, no=no):
+            test = _fold(condition, environment)
+            if isinstance(test, Number):
+                return _fold(yes if test.value else no, environment)
+            return Select(test, _fold(yes, environment), _fold(no, environment))
+        case Binary(operator=op, left=left, right=right):
+            a, b = _fold(left, environment), _fold(right, environment)
+            if op in _COMPARE and isinstance(a, Number) and isinstance(b, Number):
+                return Number(float(_COMPARE[op](a.value, b.value)))
+            if op in ("and", "or"):
+                return _logical(op == "and", a, b)
+            return Binary(op, a, b)
+    return x
+
+
+def _logical(is_and: bool, a: Expr, b: Expr) -> Expr:
+    for one, other in ((a, b), (b, a)):
+        if isinstance(one, Number):
+            return other if bool(one.value) == is_and else one
+    return Binary("and" if is_and else "or", a, b)
+
+
+def names_in(x: Expr) -> Iterator[str]:
+    """Yield every name that an expression reads."""
+    match x:
+        case Name(id=name):
+            yield name
+        case Select(condition=condition, yes=yes, no=no):
+            for part in (condition, yes, no):
+                yield from names_in(part)
+        case Binary(left=left, right=right):
+            yield from names_in(left)
+            yield from names_in(right)
