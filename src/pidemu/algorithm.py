@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pidemu.card.models import Rule
+from pidemu.errors import ScanError
 
 Place = Literal["term", "measurement", "output"]
 Scheme = Literal["none", "clamp", "clamp-sum", "freeze", "conditional", "back-calculation", "external-reset", "velocity"]
@@ -87,3 +88,19 @@ class Algorithm:
         """``kd/kp`` [s]: the derivative time that the integral of the series form sees."""
         none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
         return 0.0 if none else self.kd / self.kp
+
+
+def check_filters(a: Algorithm, h: float) -> None:
+    """Refuse a forward-rule filter that is unstable at a scan interval `h` [s].
+
+    Raises
+    ------
+    ScanError
+        ``0 < Tf <= h/2`` with the forward rule.
+    """
+    rules = [a.derivative_rule] if a.has_term_filter else [a.filter_rule] if a.has_signal_filter else []
+    if Rule.FORWARD in rules and a.Tf <= h / 2:
+        raise ScanError(
+            f"the filter time {a.Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
+            f"use a scan interval below {2 * a.Tf:g} s or no filter"
+        )

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, check_filters
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
 
@@ -147,6 +148,34 @@ def at_frequencies(w: npt.ArrayLike) -> Operators:
     )
 
 
+def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
+    """Return the discrete operators' values at frequencies `w` [rad/s].
+
+    Computed from ``1 - q`` itself, which stays accurate for frequencies far below the scan rate, where the expanded polynomials of
+    `discrete_operators` cancel.
+    """
+    rest: Response = -np.expm1(-1j * np.asarray(w, dtype=float) * h)  # 1 - q
+
+    def s_of(rule: Rule) -> Response:
+        match rule:
+            case Rule.BACKWARD:
+                return rest / h
+            case Rule.FORWARD:
+                return rest / (h * (1 - rest))
+            case Rule.TRAPEZOIDAL:
+                return 2 * rest / (h * (2 - rest))
+
+    def differentiator(Tf: float) -> Response:
+        s = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
+        return s / (1 + Tf * s)
+
+    def lag(Tf: float, order: int) -> Response:
+        s = s_of(a.filter_rule)
+        return 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s)
+
+    return Operators(1 / s_of(a.integral_rule), differentiator, lag)
+
+
 def discrete_operators(a: Algorithm, h: float) -> Operators:
     """Return the operators of an algorithm's scan rules, rational in ``q = z^-1`` (specs/equations.md, section 4).
 
@@ -156,11 +185,6 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
         The algorithm, for its rules.
     h : float
         Scan interval [s].
-
-    Raises
-    ------
-    ScanError
-        The forward rule is unstable at this interval (``Tf <= h/2``).
     """
 
     def s_of(rule: Rule) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -175,12 +199,10 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
     integral = s_of(a.integral_rule)
 
     def differentiator(Tf: float) -> Rational:
-        check_filter(a.derivative_rule, Tf, h)
         top, bottom = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
         return Rational(top, _add(bottom, _mul((Tf,), top)))
 
     def lag(Tf: float, order: int) -> Rational:
-        check_filter(a.filter_rule, Tf, h)
         top, bottom = s_of(a.filter_rule)
         if order == 1 or not Tf:
             return Rational(bottom, _add(bottom, _mul((Tf,), top))) if Tf else Rational((1.0,))
@@ -191,36 +213,45 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
     return Operators(Rational(integral[1], integral[0]), differentiator, lag)
 
 
-def check_filter(rule: Rule, Tf: float, h: float) -> None:
-    """Refuse a forward-rule filter that is unstable.
-
-    Raises
-    ------
-    ScanError
-        ``0 < Tf <= h/2`` with the forward rule.
-    """
-    if rule is Rule.FORWARD and 0 < Tf <= h / 2:
-        raise ScanError(
-            f"the filter time {Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
-            f"use a scan interval below {2 * Tf:g} s or no filter"
-        )
-
-
 @dataclass(frozen=True)
 class Law:
     """The linear law of a controller, reverse acting.
 
     Attributes
     ----------
-    feedback, setpoint : Rational
-        ``Cy`` and ``Cr``: in ``s``, or in ``q = z^-1`` when `scan` is given.
+    algorithm : Algorithm
+        The algorithm it is the law of.
     scan : float or None
-        Scan interval [s] of the discrete law.
+        Scan interval [s] of the discrete law; ``None``: the continuous one.
+
+    Raises
+    ------
+    ScanError
+        The scan interval is not a positive number, or a filter is unstable at it.
     """
 
-    feedback: Rational
-    setpoint: Rational
+    algorithm: Algorithm
     scan: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.scan is not None:
+            if not (math.isfinite(self.scan) and self.scan > 0):
+                raise ScanError(f"scan interval {self.scan:g} s is not a positive number")
+            check_filters(self.algorithm, self.scan)
+
+    @cached_property
+    def _rational(self) -> tuple[Rational, Rational]:
+        return paths(self.algorithm, CONTINUOUS if self.scan is None else discrete_operators(self.algorithm, self.scan))
+
+    @property
+    def feedback(self) -> Rational:
+        """``Cy``, from measurement to output: in ``s``, or in ``q = z^-1`` for the discrete law."""
+        return self._rational[0]
+
+    @property
+    def setpoint(self) -> Rational:
+        """``Cr``, from setpoint to output."""
+        return self._rational[1]
 
     def path(self, name: PathName) -> Rational:
         """Return the path of this name.
@@ -249,8 +280,10 @@ class Law:
         ndarray of complex, shape of `w`
             Gain [%/%] and phase of the path.
         """
-        s = 1j * np.asarray(w, dtype=float)
-        return self.path(path)(s if self.scan is None else np.exp(-s * self.scan))
+        self.path(path)  # refuses a wrong name
+        values = at_frequencies(w) if self.scan is None else at_scan(self.algorithm, self.scan, w)
+        found = paths(self.algorithm, values)[0 if path == "feedback" else 1]
+        return np.broadcast_to(np.asarray(found, dtype=np.complex128), np.shape(w)).copy()
 
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """Return ``n0, n1, n2, d1, d2`` of the continuous feedback path (specs/equations.md, section 2).
@@ -354,23 +387,4 @@ def _trim(coefficients: Sequence[float]) -> list[float]:
     return trimmed
 
 
-def law_of(algorithm: Algorithm, scan: float | None = None) -> Law:
-    """Return the law of an algorithm.
-
-    Parameters
-    ----------
-    algorithm : Algorithm
-        The algorithm.
-    scan : float, optional
-        Scan interval [s]: the discrete law. Without it: the continuous law.
-
-    Raises
-    ------
-    ScanError
-        The scan interval is not a positive number, or a filter is unstable at it.
-    """
-    if scan is None:
-        return Law(*paths(algorithm, CONTINUOUS))
-    if not (math.isfinite(scan) and scan > 0):
-        raise ScanError(f"scan interval {scan:g} s is not a positive number")
-    return Law(*paths(algorithm, discrete_operators(algorithm, scan)), scan=scan)
+law_of = Law

@@ -210,9 +210,9 @@ class Settings(Mapping[str, Value]):
         scan : float, optional
             Scan interval [s], for the discrete law; without it the continuous one.
         """
-        from pidemu.law import law_of  # the law is made from settings, not settings from the law
+        from pidemu.law import Law  # the law is made from settings, not settings from the law
 
-        return law_of(self.algorithm(), scan)
+        return Law(self.algorithm(), scan)
 
 
 def _spans(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
@@ -473,7 +473,7 @@ def _filter(settings: Settings, filt: Filter | None, rate: float, time: float) -
         gain = _pick(settings, filt.gain, math.inf)
         if gain == 0:
             raise SettingError(
-                f"{settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative itself to zero"
+                f"{settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative to zero"
             )
         return base / gain, place, filt.order
     return base * _pick(settings, filt.ratio, 0.0), place, filt.order

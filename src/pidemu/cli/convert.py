@@ -249,7 +249,7 @@ def _textbook(c: Conversion) -> None:
     elif c.match != "textbook":
         band = book.certificate.feedback.loop_band
         click.echo(
-            f"  the textbook rule would deviate by {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band, feedback"
+            f"  the textbook rule would deviate by {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band"
         )
 
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
+from pidemu.algorithm import Algorithm
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion import match as closed
@@ -16,7 +17,7 @@ from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.nearest import nearest
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
-from pidemu.law import Law, Rational, law_of
+from pidemu.law import Law
 from pidemu.plain import json_safe
 from pidemu.settings import Settings
 from pidemu.units import Role
@@ -210,10 +211,8 @@ def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float
     return factor
 
 
-def _scaled(law: Law, factor: float) -> Law:
-    if factor == 1:
-        return law
-    return replace(law, feedback=law.feedback * Rational((factor,)), setpoint=law.setpoint * Rational((factor,)))
+def _scaled(a: Algorithm, factor: float) -> Algorithm:
+    return a if factor == 1 else replace(a, kp=a.kp * factor, ki=a.ki * factor, kd=a.kd * factor)
 
 
 class _Work:
@@ -225,9 +224,9 @@ class _Work:
         self.factor = factor
         self.scans = scans
         self.algorithm = source.algorithm()
-        self.law = law_of(self.algorithm)
-        self.scaled = _scaled(self.law, factor)
-        self.at_source_scan = law_of(self.algorithm, scans[0]) if scans else None
+        self.law = Law(self.algorithm)
+        self.scaled = Law(_scaled(self.algorithm, factor))
+        self.at_source_scan = Law(self.algorithm, scans[0]) if scans else None
 
     def solve(self, match: str | None) -> tuple[Settings | None, Match, str]:
         """Return the target's settings, how they were found, and why they are only the nearest ones."""
@@ -258,22 +257,31 @@ class _Work:
         try:
             settings = self._low_frequency()
         except (NoMatchError, SettingError) as error:
-            raise (why if isinstance(why, NoMatchError) else error) from None
+            raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
         how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
         if match == "exact" and how != "exact":
             raise NoMatchError("its filter is fixed, and no settings give the same law")
         return settings, how
 
     def _low_frequency(self) -> Settings:
-        """Match the moments, with a free filter set as near as its range allows to the source's."""
+        """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""
         filt = self.target.filter
-        fixed = replace(filt, free=False)
+        tries = [replace(filt, free=False)]
         if filt.free:
-            Tf, base = self._wanted_filter()
-            fixed = filt.nearest_to(Tf, base)
-        self.target.__dict__["filter"] = fixed
+            tries.insert(0, filt.nearest_to(*self._wanted_filter()))
+        for fixed in tries:
+            self.target.filter = fixed
+            try:
+                return self._roots(fixed)
+            except (NoMatchError, SettingError):
+                if fixed is tries[-1]:
+                    raise
+        raise AssertionError("unreachable")
+
+    def _roots(self, fixed: TargetFilter) -> Settings:
+        """Return the settings of the first solution, or of another where that is the source's own law."""
         first, *others = closed.low_frequency(self.scaled, self.target, fixed)
-        for numbers in others:  # the root with Ti < Td only where it is the source itself
+        for numbers in others:
             with suppress(SettingError):
                 settings = self._with_filter(numbers, fixed)
                 if self._certify(settings).feedback.is_exact:
@@ -306,8 +314,7 @@ class _Work:
         a = self.algorithm
         per = 1.0 if self.source.equation.form == "parallel" else a.kp
         dial_kd = per * time.canonical if time is not None and a.kd and self.source.equation.form != "parallel" else a.kd
-        scaled = replace(a, kp=a.kp * self.factor, ki=a.ki * self.factor, kd=a.kd * self.factor)
-        return self.target.settings(closed.textbook(scaled, dial_kd * self.factor, self.target))
+        return self.target.settings(closed.textbook(self.scaled.algorithm, dial_kd * self.factor, self.target))
 
     def _weighted(self, numbers: Numbers) -> Settings:
         """Return settings with the setpoint weights that keep the setpoint path, as far as their ranges allow."""

@@ -14,7 +14,17 @@ from pidemu.units import Role
 
 
 class NoMatchError(Exception):
-    """A closed form has no solution; the message is the reason, for the user."""
+    """A closed form has no solution; the message is the reason, for the user.
+
+    Attributes
+    ----------
+    fundamental : bool
+        Whether no filter and no other match of the same target could help.
+    """
+
+    def __init__(self, reason: str, *, fundamental: bool = False) -> None:
+        super().__init__(reason)
+        self.fundamental = fundamental
 
 
 _ROUNDING = 1e-12
@@ -78,7 +88,7 @@ def _exact_series(n0: float, n1: float, n2: float, d1: float, filt: TargetFilter
     """Factor the numerator; the larger root is the integral time."""
     root = n1 * n1 - 4 * n0 * n2
     if root < -_ROUNDING * n1 * n1:
-        raise NoMatchError(_complex_zeros(n0, n1, n2))
+        raise NoMatchError(_complex_zeros(n0, n1, n2), fundamental=True)
     lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
     K = n1 - n0 * lead
     time = lead if filt.lead_lag else lead - d1
@@ -101,7 +111,7 @@ def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: T
         return Numbers(n1, n0, n2, Tf if target.filter.free else None)
     root = n1 * n1 - 4 * n0 * n2
     if root < -_ROUNDING * n1 * n1:
-        raise NoMatchError(_complex_zeros(n0, n1, n2))
+        raise NoMatchError(_complex_zeros(n0, n1, n2), fundamental=True)
     lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
     K = n1 - n0 * lead
     return Numbers(K, n0, K * lead, Tf if target.filter.free else None)

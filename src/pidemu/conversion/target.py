@@ -131,6 +131,8 @@ class Target:
         self.spans = Spans(*(r[1] - r[0] if r else 100.0 for r in (pv_range, op_range)))
         self.form = self.variant.equation.form
         self._check_given()
+        self.filter = self._find_filter()
+        """The filter, whether it is free and, once a match has fixed it, its value."""
 
     def _check_given(self) -> None:
         known = {n.casefold(): n for n in self.variant.equation.settings}
@@ -172,9 +174,7 @@ class Target:
         """Whether there is a derivative term."""
         return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
 
-    @cached_property
-    def filter(self) -> TargetFilter:
-        """The filter and whether it is free."""
+    def _find_filter(self) -> TargetFilter:
         filt = self.variant.equation.derivative.filter
         if filt is None:
             return TargetFilter()

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, check_filters
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
 from pidemu.scan import blocks
@@ -92,15 +92,7 @@ def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float) -> 
         raise ScanError("a bias belongs to a positional controller without integral action; leave it out")
     if a.windup == "external-reset" and a.integral_rule is Rule.TRAPEZOIDAL and a.ki:
         raise ScanError("external-reset windup is defined for the backward and forward rules only")
-    for rule, Tf in [
-        (a.derivative_rule, a.Tf if a.has_term_filter else 0),
-        (a.filter_rule, a.Tf if a.has_signal_filter else 0),
-    ]:
-        if rule is Rule.FORWARD and 0 < Tf <= h / 2:
-            raise ScanError(
-                f"the filter time {Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
-                f"use a scan interval below {2 * Tf:g} s or no filter"
-            )
+    check_filters(a, h)
 
 
 def _terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initial_output: float) -> Terms:
