@@ -12,14 +12,14 @@ from pathlib import Path
 import pidemu
 
 SCANS = 120
-GAIN, LAG, DELAY = 1.2, 12.0, 4
+GAIN, LAG, DELAY = 0.8, 40.0, 3
 """Process: gain [%/%], time constant [s], dead time [s]."""
 
 HEAD = """\
 # The output column is pidemu's own: fisher/provox GAIN=2 RESET=4 RATE=0.1, scan 1 s, reverse acting, limits 0 to 100.
-# The process is simulated: gain 1.2, time constant 12 s, dead time 4 s; the transmitter resolves 0.01 %.
-# Setpoint step after 10 s, load disturbance from 45 s, manual from 75 to 89 s. Check: pidemu run fisher/provox GAIN=2 RESET=4 RATE=0.1
-#   --scan 1 --record examples/record.csv
+# The process is simulated: gain 0.8, time constant 40 s, dead time 3 s; the transmitter resolves 0.01 %.
+# Setpoint step after 10 s, load disturbance from 45 s, manual from 75 to 89 s. To check:
+# pidemu run fisher/provox GAIN=2 RESET=4 RATE=0.1 --scan 1 --record examples/record.csv
 sp,pv,auto,manual,output
 """
 
@@ -33,10 +33,10 @@ def record() -> str:
     pipe = deque([40.0] * DELAY)
     lines = []
     for n in range(SCANS):
-        load = 3.0 if n >= 45 else 0.0
+        load = -8.0 if n >= 45 else 0.0
         sp, pv = (55.0 if n >= 10 else 50.0), round(level, 2)
         auto = not 75 <= n < 90
-        manual = 38.0 if n < 82 else 45.0
+        manual = 56.0 if n < 82 else 60.0
         output = controller.scan(sp, pv, auto, None if auto else manual)
         lines.append(f"{sp:g},{pv:g},{auto:d},{'' if auto else f'{manual:g}'},{output!r}")
         pipe.append(output)

@@ -93,9 +93,10 @@ def settings_of(data: st.DataObject, card: Card) -> Settings:
 
 @st.composite
 def scans_of(draw: st.DrawFn, algorithm: Algorithm) -> float:
-    """A scan interval [s] at which the algorithm is stable, from 0.05 s to 10 s or to its filter time."""
-    forward = Rule.FORWARD in (algorithm.derivative_rule, algorithm.filter_rule) and algorithm.Tf
-    highest = min(10.0, algorithm.Tf) if forward else 10.0
+    """A scan interval [s]; with a rule that rings or is unstable where the filter is faster than the scan, one below its time."""
+    rules = (algorithm.derivative_rule, algorithm.filter_rule)
+    rings = algorithm.Tf and any(rule is not Rule.BACKWARD for rule in rules)
+    highest = min(10.0, algorithm.Tf) if rings else 10.0
     return draw(st.floats(min(0.05, highest / 2), highest))
 
 

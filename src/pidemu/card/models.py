@@ -9,7 +9,7 @@ from datetime import date
 from enum import StrEnum
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 
 def _hyphen(name: str) -> str:
@@ -33,7 +33,12 @@ class Model(BaseModel):
 
 
 Text = Annotated[str, Field(min_length=1)]
-Number = Annotated[float, Field(strict=True), BeforeValidator(_infinity)]
+Number = Annotated[
+    float,
+    Field(strict=True),
+    BeforeValidator(_infinity),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
+]
 SettingName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 

@@ -265,18 +265,13 @@ class _Work:
 
     def _low_frequency(self) -> Settings:
         """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""
-        filt = self.target.filter
-        tries = [replace(filt, free=False)]
-        if filt.free:
-            tries.insert(0, filt.nearest_to(*self._wanted_filter()))
-        for fixed in tries:
-            self.target.filter = fixed
-            try:
-                return self._roots(fixed)
-            except (NoMatchError, SettingError):
-                if fixed is tries[-1]:
-                    raise
-        raise AssertionError("unreachable")
+        delivered = replace(self.target.filter, free=False)
+        if self.target.filter.free:
+            self.target.filter = self.target.filter.nearest_to(*self._wanted_filter())
+            with suppress(NoMatchError, SettingError):
+                return self._roots(self.target.filter)
+        self.target.filter = delivered
+        return self._roots(delivered)
 
     def _roots(self, fixed: TargetFilter) -> Settings:
         """Return the settings of the first solution, or of another where that is the source's own law."""

@@ -1,0 +1,58 @@
+"""Two controllers side by side: the same record through both, and their responses by an own computation."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+import pidemu
+from pidemu.settings import Settings
+from tests.helpers import WIDE
+
+Floats = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+def random_signal(seed: int, scans: int = 200, rest: int = 3) -> Floats:
+    """At rest at 50 % for a few scans, then a random walk with jumps."""
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(0, 0.5, scans) + 10 * (rng.random(scans) < 0.05) * rng.normal(0, 1, scans)
+    steps[:rest] = 0
+    return np.asarray(50 + np.cumsum(steps))
+
+
+def outputs(settings: Settings, sp: Floats, pv: Floats, scan: float, start: float = 50.0) -> Floats:
+    """Output of a reverse-acting controller that no limit touches, at rest at `start` before the first scan."""
+    return pidemu.Controller(settings, scan, output_limits=WIDE, initial_output=start).run(sp, pv)
+
+
+def difference(a: Floats, b: Floats) -> float:
+    """Largest difference of two outputs, per span or per what they move over where that is more."""
+    size = max(100.0, float(np.max(np.abs(a))), float(np.max(np.abs(b))))
+    return float(np.max(np.abs(a - b))) / size
+
+
+def continuous(settings: Settings, w: Floats, *, setpoint: bool = False) -> Complex:
+    """Response of a card whose filter sits on the derivative or is a lead-lag, from the dials in canonical units (equations.md, 2).
+
+    Written out term by term as block diagrams are drawn, not as the quotient of polynomials that pidemu uses.
+    """
+    s = 1j * w
+    a = settings.algorithm()
+    assert a.filter_on == "term"
+    dials = {v.role.value: v.canonical for v in settings.values() if v.active}
+    e = settings.equation
+    K = dials.get("gain", 0.0) * dials.get("multiplier", 1.0)
+    filt = e.derivative.filter
+    lead_lag = filt is not None and filt.applies_to == "lead-lag"
+    b, c = (a.b, a.c) if setpoint else (1.0, 1.0)
+    if e.form == "parallel":
+        ki, kd = (dials.get(x, 0.0) * dials.get("multiplier", 1.0) for x in ("integral", "derivative"))
+        return np.asarray(b * K + ki / s + c * kd * s / (1 + a.Tf * s))
+    rate, Td = dials.get("integral", 0.0), dials.get("derivative", 0.0)
+    if e.form == "standard":
+        return np.asarray(K * (b + rate / s + c * Td * s / (1 + a.Tf * s)))
+    lead = (1 + Td * s) / (1 + a.Tf * s) if lead_lag else 1 + Td * s / (1 + a.Tf * s)
+    if not setpoint:
+        return np.asarray(K * (1 + rate / s) * lead)
+    return np.asarray(K * (b + rate / s + (1 + rate / s) * c * (lead - 1)))
