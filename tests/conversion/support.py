@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from hypothesis import assume
+from hypothesis import strategies as st
 
 import pidemu
+from pidemu.card.load import Card
 from pidemu.settings import Settings
-from tests.helpers import WIDE
+from tests.helpers import WIDE, settings_of
 
 Floats = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -56,3 +59,10 @@ def continuous(settings: Settings, w: Floats, *, setpoint: bool = False) -> Comp
     if not setpoint:
         return np.asarray(K * (1 + rate / s) * lead)
     return np.asarray(K * (b + rate / s + (1 + rate / s) * c * (lead - 1)))
+
+
+def settings_that_act(data: st.DataObject, card: Card) -> Settings:
+    """Draw settings of a card with at least one term; with none there is no law to compare."""
+    drawn = settings_of(data, card)
+    assume(any(drawn.law().moments()))
+    return drawn

@@ -76,6 +76,8 @@ def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None)
     scheme = windup or draw(st.sampled_from(POSITIONAL_SCHEMES))
     rules = [Rule.BACKWARD, Rule.FORWARD] if scheme == "external-reset" else list(Rule)
     b = 0.0 if scheme == "clamp-sum" else draw(weights)
+    filter_rule = draw(st.sampled_from(Rule))
+    fastest = 1.1 if order == 2 and filter_rule is Rule.FORWARD else 0.6  # in scans; the forward rule is stable above 1 and 1/2
     return Algorithm(
         series=series,
         kp=kp,
@@ -83,12 +85,12 @@ def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None)
         kd=draw(gains),
         b=b,
         c=draw(weights),
-        Tf=draw(st.just(0.0) | st.floats(0.6, 20)) * h,
+        Tf=draw(st.just(0.0) | st.floats(fastest, 20)) * h,
         filter_on=place,
         filter_order=order,
         integral_rule=draw(st.sampled_from(rules)),
         derivative_rule=draw(st.sampled_from(Rule)),
-        filter_rule=draw(st.sampled_from(Rule)),
+        filter_rule=filter_rule,
         windup=scheme,
         tracking_time=draw(st.floats(1, 100)),
         accumulated=b == 0 and (scheme == "clamp-sum" or draw(st.booleans())),
@@ -502,6 +504,22 @@ def test_an_unstable_forward_filter_is_refused(place: Place) -> None:
     with pytest.raises(ScanError, match="is unstable; use a scan interval below 1 s or no filter"):
         build(a, 1.0)
     assert run(build(a, 0.9), record(3)).size == 150
+
+
+@pytest.mark.parametrize("Tf", [0.6, 1.0])
+def test_a_second_order_forward_filter_is_refused_up_to_the_scan_interval(Tf: float) -> None:
+    # s = (z - 1)/h puts the poles (-1 +- j)/Tf at 1 - (1 -+ j) h/Tf, inside the unit circle only for Tf > h
+    a = replace(PI, Tf=Tf, filter_on="measurement", filter_order=2, filter_rule=Rule.FORWARD)
+    with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
+        build(a, 1.0)
+    with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
+        law_of(a, 1.0)
+
+
+def test_a_proportional_term_in_the_integral_sum_stays_where_there_is_no_integral() -> None:
+    a = Algorithm(series=False, kp=2.0, ki=0.0, kd=0.0, b=0.0, windup="clamp-sum", accumulated=True)
+    x = record(6, amplitude=10.0)
+    assert np.array_equal(run(build(replace(a, load_output=True), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x))
 
 
 def test_a_velocity_program_with_every_term_off_holds_its_output() -> None:

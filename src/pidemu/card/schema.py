@@ -71,8 +71,8 @@ def _partial_references(value: Any, definitions: dict[str, Any]) -> Any:
         if reference and definitions.get(name, {}).get("type") == "object" and not name.startswith(_WHOLE):
             return {**value, "$ref": f"#/$defs/Partial{name}"}
         found = {k: _partial_references(v, definitions) for k, v in value.items()}
-        if isinstance(found.get("additionalProperties"), dict):  # a choice may remove an entry of a mapping
-            found["additionalProperties"] = {"anyOf": [found["additionalProperties"], {"type": "null"}]}
+        if "patternProperties" in found:  # a choice may remove an entry of a mapping
+            found["patternProperties"] = {k: {"anyOf": [v, {"type": "null"}]} for k, v in found["patternProperties"].items()}
         return found
     return [_partial_references(v, definitions) for v in value] if isinstance(value, list) else value
 

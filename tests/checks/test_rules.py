@@ -1,0 +1,412 @@
+"""Every rule over cards, broken by one small edit: what the contributor reads, and that no rule goes untested."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pidemu.card.load import Card, variants
+from pidemu.checks import equations, runs, statements
+from pidemu.errors import Problem
+from tests.checks.bench import ALPHA, ALPHA_EVIDENCE, CHOICE, GAIN, VALID, WINDUP, Edit, edited, faults, headlines, loaded
+
+Case = tuple[str, tuple[Edit, ...], tuple[str, ...]]
+
+_UNITS = (
+    "1, %/%, %, eu, eu/eu, %/eu, ms, ms/repeat, repeat/ms, 1/ms, s, s/repeat, repeat/s, 1/s, "
+    "min, min/repeat, repeat/min, 1/min, h, h/repeat, repeat/h, 1/h"
+)
+_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero instead"
+_FILTER_GAIN: tuple[Edit, ...] = (
+    ("ratio: ALPHA", "gain: ALPHA"),
+    (ALPHA, '  ALPHA: {sets: filter-gain, unit: "1", off: 0, default: 0}\n'),
+    ("off: 0, default: 0}\n  ALPHA", "off: 0}\n  ALPHA"),
+    ("RATE: 16}", "RATE: 16, ALPHA: 8}"),
+)
+_NO_ALPHA: tuple[Edit, ...] = ((ALPHA, ""), (ALPHA_EVIDENCE, ""))
+
+STATEMENTS: tuple[Case, ...] = (
+    (
+        "reject_wrong_folder",
+        (("vendor: Nobody", "vendor: Some Body & Co."),),
+        ("2:9: vendor 'Some Body & Co.' belongs in folder 'some-body-co', the card is in 'nobody'",),
+    ),
+    (
+        "reject_dangling_sources",
+        (("source: manual, at: trace 1", "source: manul, at: trace 1"),),
+        ("31:46: no source 'manul' (did you mean 'manual'?); list it under sources",),
+    ),
+    (
+        "reject_dangling_sources",
+        (("hums., source: manual", "hums., source: folklore"),),
+        ("43:37: no source 'folklore'; list it under sources",),
+    ),
+    (
+        "reject_unused_sources",
+        (("2026-01-02}", "2026-01-02}\n  web: {title: A page, read: 2026-01-02}"),),
+        ("7:3: source 'web' is not used by any evidence, quirk or example",),
+    ),
+    ("reject_incomplete_evidence", (("source: manual, at: trace 1", "at: trace 1"),), ("31:3: 'measured' needs 'source'",)),
+    ("reject_incomplete_evidence", ((", at: trace 1", ""),), ("31:3: 'measured' needs 'at'",)),
+    ("reject_incomplete_evidence", ((", note: from the step response", ""),), ("33:3: 'inferred' needs 'note'",)),
+    (
+        "reject_incomplete_evidence",
+        (("derivative: {status: assumed, note: not stated}", "derivative: {status: assumed}"),),
+        ("34:3: 'assumed' needs 'note'",),
+    ),
+    (
+        "reject_evidence_for_nothing",
+        (("quirks:\n", "  options.FORM: {status: assumed, note: a guess}\nquirks:\n"),),
+        ("42:3: nothing at 'options.FORM' in this card",),
+    ),
+    (
+        "reject_evidence_for_nothing",
+        (("  transfer: {status", "  transfr: {status"),),
+        (
+            "12:12: no evidence covers 'transfer.start'; add it under evidence, if only as assumed",
+            "35:3: nothing at 'transfr' in this card (did you mean 'transfer'?)",
+        ),
+    ),
+    (
+        "reject_fields_without_evidence",
+        (("  scan: {status: assumed, note: not stated}\n", ""),),
+        ("27:8: no evidence covers 'scan.default'; add it under evidence, if only as assumed",),
+    ),
+    (
+        "reject_fields_without_evidence",
+        (("  options: {status", "  options.STRUCTURE.default: {status"),),
+        (
+            "23:29: no evidence covers 'options.STRUCTURE.choices.I-PD.proportional.on'; add it under evidence, if only as assumed",
+        ),
+    ),
+    (
+        "reject_fields_without_evidence",
+        (("  options: {status", "  options.STRUCTURE.choices: {status"),),
+        ("20:5: no evidence covers 'options.STRUCTURE.default'",),
+    ),
+    (
+        "reject_overlapping_options",
+        (("action:\n  names", "  OTHER:\n    default: A\n    choices: {A: {}, B: {proportional: {on: none}}}\naction:\n  names"),),
+        ("24:3: 'proportional.on' is changed by option STRUCTURE as well; let one option do it",),
+    ),
+    (
+        "reject_ambiguous_names",
+        (("action:\n  names", "  pv_range:\n    default: A\n    choices: {A: {}}\naction:\n  names"),),
+        ("24:3: 'pv_range' is reserved for the signal range",),
+    ),
+    ("reject_ambiguous_names", (("  STRUCTURE:\n", "  Gain:\n"),), ("19:3: 'Gain' and 'GAIN' cannot be told apart",)),
+    (
+        "reject_ambiguous_names",
+        ((ALPHA, '  gain: {sets: multiplier, unit: "1", default: 1}\n' + ALPHA),),
+        ("17:3: 'gain' and 'GAIN' cannot be told apart",),
+    ),
+)
+
+EQUATIONS: tuple[Case, ...] = (
+    (
+        "reject_bad_units",
+        (("integral, unit: s", "integral, unit: fortnight"),),
+        (f"15:33: unknown unit 'fortnight'; known units: {_UNITS}",),
+    ),
+    (
+        "reject_bad_units",
+        (("derivative, unit: s", "derivative, unit: 1/s"),),
+        ("16:34: '1/s' is a rate (1/time) and cannot set derivative; use one of: s, min",),
+    ),
+    ("reject_bad_units", (("integral, unit: s", "integral, unit: seconds"),), ("15:33: write the unit 's'",)),
+    (
+        "reject_bad_units",
+        (("form: standard", "signals: engineering\nform: standard"), ("  form: {status", "  signals: {status: assumed, note: so\n    }\n  form: {status")),
+        ("15:28: with 'signals: engineering' the gain's unit is 'eu/eu'",),
+    ),
+    (
+        "reject_bad_units",
+        ((CHOICE, "{settings: {RESET: {unit: repeat}}}"),),
+        (f"23:39: unknown unit 'repeat' (did you mean 's/repeat'?); known units: {_UNITS}",),
+    ),
+    ("reject_bad_numbers", (("[0.05, 1]", "[1, 0.05]"),), ("17:49: range 1 to 0.05 does not ascend",)),
+    ("reject_bad_numbers", (("default: 0.125", "default: 2"),), ("17:69: default 2 is outside 0.05 to 1 and no off value",)),
+    ("reject_bad_numbers", (("default: 0.125", "default: .nan"),), ("17:69: default is not a number",)),
+    ("reject_bad_numbers", (("[0, 100]", "[100, 0]"),), ("28:18: output limits 100 to 0 do not ascend",)),
+    (
+        "reject_bad_numbers",
+        ((CHOICE, "{settings: {ALPHA: {range: [0.2, 1]}}}"),),
+        ("17:69: default 0.125 is outside 0.2 to 1 and no off value",),
+    ),
+    ("reject_bad_numbers", ((CHOICE, "{output: {limits: [5, 1]}}"),), ("23:31: output limits 5 to 1 do not ascend",)),
+    (
+        "reject_unexplained_defaults",
+        ((ALPHA_EVIDENCE, ""),),
+        ("17:69: default 0.125 needs evidence of its own, at 'settings.ALPHA.default' or 'settings.ALPHA'",),
+    ),
+    (
+        "reject_unexplained_defaults",
+        ((CHOICE, "{settings: {RATE: {default: 5}}}"),),
+        (
+            "23:41: default 5 needs evidence of its own, at 'options.STRUCTURE.choices.I-PD.settings.RATE.default' "
+            "or 'options.STRUCTURE.choices.I-PD.settings.RATE'",
+        ),
+    ),
+    ("reject_bad_scan", (("default: 1 s", "default: 0 s"),), ("27:17: '0 s' is no time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", 'default: "1"'),), ("27:17: '1' is no time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", "default: 1 %"),), ("27:17: '1 %' is no time; write it like '1 s'",)),
+    (
+        "reject_bad_scan",
+        (("default: 1 s", "default: fast"),),
+        ("27:17: 'fast' is not a number, nor a number with a unit such as \"20 s/repeat\"",),
+    ),
+    ("reject_missing_dials", ((GAIN, ""),), ("13:1: no setting sets the gain",)),
+    (
+        "reject_missing_dials",
+        ((GAIN, GAIN + '  PB: {sets: gain, unit: "%"}\n'),),
+        ("15:3: 'GAIN' and 'PB' both set the gain",),
+    ),
+    (
+        "reject_missing_dials",
+        ((CHOICE, "{settings: {PB: {sets: gain, unit: '%'}}}"),),
+        ("23:25: 'GAIN' and 'PB' both set the gain",),
+    ),
+    ("reject_missing_dials", ((CHOICE, "{settings: {RESET: null}}"),), ("23:14: no setting sets the integral",)),
+    (
+        "reject_bad_references",
+        (("ratio: ALPHA", "ratio: ALFA"),),
+        ("11:56: no setting 'ALFA' (did you mean 'ALPHA'?)", "17:3: nothing uses 'ALPHA'"),
+    ),
+    (
+        "reject_bad_references",
+        (("ratio: ALPHA", "ratio: RATE"),),
+        ("11:56: 'RATE' sets the derivative, here a filter-ratio is needed", "17:3: nothing uses 'ALPHA'"),
+    ),
+    ("reject_bad_references", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
+    (
+        "reject_bad_references",
+        ((WINDUP, "{scheme: back-calculation, tracking-time: TT}"),),
+        ("10:89: no setting 'TT'",),
+    ),
+    (
+        "reject_bad_references",
+        ((CHOICE, "{proportional: {on: weighted, weight: BETA}}"),),
+        ("23:47: no setting 'BETA'",),
+    ),
+    (
+        "reject_bad_weights",
+        (("proportional: {on: error}", "proportional: {on: weighted}"),),
+        ("9:16: 'on: weighted' needs 'weight'",),
+    ),
+    (
+        "reject_bad_weights",
+        (("derivative: {on: pv", "derivative: {on: pv, weight: 0.5"),),
+        ("11:14: 'weight' has no meaning with 'on: pv'",),
+    ),
+    ("reject_bad_weights", ((CHOICE, "{proportional: {on: weighted}}"),), ("23:29: 'on: weighted' needs 'weight'",)),
+    (
+        "reject_bad_filter",
+        (("ratio: ALPHA", "ratio: ALPHA, time: 2"),),
+        ("11:22: a filter needs exactly one of ratio, gain and time",),
+    ),
+    (
+        "reject_bad_filter",
+        (("term, ratio: ALPHA", "term"), *_NO_ALPHA),
+        ("11:22: a filter needs exactly one of ratio, gain and time",),
+    ),
+    (
+        "reject_bad_filter",
+        (("applies-to: term", "applies-to: lead-lag"),),
+        ("11:22: a lead-lag belongs to the series form, this is 'standard'",),
+    ),
+    (
+        "reject_bad_filter",
+        (("applies-to: term", "applies-to: term, order: 2"),),
+        ("11:22: a filter of order 2 is defined for the measurement only",),
+    ),
+    (
+        "reject_bad_filter",
+        (("ratio: ALPHA", "time: 2, of: effective-derivative"), *_NO_ALPHA),
+        ("11:22: 'of' refers to ratio or gain, not to time",),
+    ),
+    (
+        "reject_bad_filter",
+        ((CHOICE, "{derivative: {filter: {applies-to: lead-lag, ratio: 0.1}}}"),),
+        ("23:27: a lead-lag belongs to the series form, this is 'standard'",),
+    ),
+    (
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: velocity}"),),
+        ("10:39: windup 'velocity' does not go with implementation 'positional'",),
+    ),
+    (
+        "reject_bad_windup",
+        (("implementation: positional", "implementation: velocity"),),
+        ("10:39: windup 'back-calculation' does not go with implementation 'velocity'",),
+    ),
+    (
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
+        ("10:42: external-reset is defined for the backward and forward rules",),
+    ),
+    (
+        "reject_bad_windup",
+        (("proportional: {on: error}", "proportional: {on: error, accumulated: true}"), (CHOICE, "{scan: {default: 2 s}}")),
+        ("9:27: 'accumulated' belongs to a positional P on pv",),
+    ),
+    (
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: clamp-sum}"), ("proportional: {on: error}", "proportional: {on: pv}")),
+        ("10:39: clamp-sum with P on pv needs 'proportional.accumulated: true'",),
+    ),
+    (
+        "reject_bad_windup",
+        ((CHOICE, "{integral: {windup: {scheme: velocity}}}"),),
+        ("23:25: windup 'velocity' does not go with implementation 'positional'",),
+    ),
+    (
+        "reject_wrong_action",
+        ((", direct: Direct", ""),),
+        ("25:3: names needs both 'reverse' and 'direct'",),
+    ),
+    (
+        "reject_wrong_action",
+        (("direct: Direct", "direct: Auto"), ("reverse: Reverse", "reverse: Auto"), ("name: Reverse", "name: Auto")),
+        ("25:3: reverse and direct have the same name 'Auto'",),
+    ),
+    (
+        "reject_wrong_action",
+        (("name: Reverse", "name: Backward"),),
+        ("26:3: 'Backward' is not one of the names: Reverse, Direct",),
+    ),
+    ("reject_wrong_action", (("sp: 50, pv: 51", "sp: 50, pv: 50"),), ("26:3: setpoint and measurement must differ",)),
+    (
+        "reject_wrong_action",
+        (("output: falls", "output: rises"),),
+        ("26:3: with reverse action the output falls, the example says it rises",),
+    ),
+    (
+        "reject_wrong_action",
+        ((CHOICE, "{action: {example: {name: Direct}}}"),),
+        ("23:23: with direct action the output rises, the example says it falls",),
+    ),
+)
+
+RUNS: tuple[Case, ...] = (
+    ("reject_wrong_examples", (("{kp: 2,", "{kp: 3,"),), ("46:21: kp is 3, the settings amount to 2",)),
+    ("reject_wrong_examples", ((", Tf: 2}", "}"),), ("46:16: Tf is 0, the settings amount to 2",)),
+    (
+        "reject_wrong_examples",
+        (("RESET: 60,", "RESET: 1,"),),
+        ("46:28: ki is 0.0333333, the settings amount to 2",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("{GAIN: 2,", "{GIAN: 2,"),),
+        ("45:5: nobody/bench: unknown setting 'GIAN' (did you mean 'GAIN'?); settings: GAIN, RESET, RATE, ALPHA, STRUCTURE",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("{GAIN: 2,", "{STRUCTURE: PI-D, GAIN: 2,"),),
+        ("45:5: nobody/bench: option STRUCTURE has no choice 'PI-D' (did you mean 'PID'?); choices: PID, I-PD",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("{GAIN: 2, RESET: 60, RATE: 16}", "{}"),),
+        (
+            "45:5: nobody/bench: GAIN: missing; it sets the gain, in %/%",
+            "45:5: nobody/bench: RESET: missing; it sets the integral, in s",
+        ),
+    ),
+    (
+        "reject_wrong_examples",
+        (("applies-to: term", "applies-to: measurement, order: 2"),),
+        ("45:5: a second-order filter has no parallel gains; choose settings without it",),
+    ),
+    (
+        "reject_unrunnable",
+        _FILTER_GAIN,
+        (f"19:3: with STRUCTURE=I-PD: {_ZERO_GAIN}", f"19:3: with STRUCTURE=PID: {_ZERO_GAIN}"),
+    ),
+)
+
+_ROOMS: dict[str, tuple[Iterable[Callable[..., Iterable[Problem]]], tuple[Case, ...]]] = {
+    "statements": (statements.RULES, STATEMENTS),
+    "equations": (equations.RULES, EQUATIONS),
+    "runs": (runs.RULES, RUNS),
+}
+
+
+def _named(case: Case, number: int, room: str) -> Any:
+    return pytest.param(room, *case, id=f"{case[0]}-{number}")
+
+
+@pytest.mark.parametrize("room", _ROOMS)
+def test_every_rule_is_broken_by_some_card(room: str) -> None:
+    rules, cases = _ROOMS[room]
+    assert {rule.__name__ for rule in rules} == {name for name, _, _ in cases}
+
+
+@pytest.mark.parametrize(
+    ("room", "rule", "edits", "expected"),
+    [_named(case, i, room) for room, (_, cases) in _ROOMS.items() for i, case in enumerate(cases)],
+)
+def test_a_card_that_breaks_a_rule_is_refused_at_its_place(
+    room: str, rule: str, edits: tuple[Edit, ...], expected: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = edited(VALID, *edits)
+    assert list(expected) == headlines(faults(tmp_path, text))
+    assert set() < _found_by(room, rule, loaded(tmp_path, text)) <= set(expected)
+
+
+def _found_by(room: str, name: str, card: Card) -> set[str]:
+    [rule] = [r for r in _ROOMS[room][0] if r.__name__ == name]
+    subjects = list(variants(card)) if room == "equations" else [card]
+    return {headline for subject in subjects for headline in headlines(list(rule(subject)))}
+
+
+def test_faults_of_two_rules_come_in_the_order_of_the_file(tmp_path: Path) -> None:
+    text = edited(VALID, ("output: falls", "output: rises"), ("ratio: ALPHA", "ratio: 0.1"), ("[0, 100]", "[1, 0]"))
+    assert ["17:3", "26:3", "28:18"] == [h.split(": ")[0] for h in headlines(faults(tmp_path, text))]
+
+
+def test_two_choices_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
+    other = "  LIMITS:\n    default: Clamp\n    choices: {Clamp: {}, Free: {integral: {windup: {scheme: none}}}}\naction:\n  names"
+    both = edited(VALID, ("action:\n  names", other), (CHOICE, "{implementation: velocity, integral: {windup: {scheme: velocity}}}"))
+    assert [
+        "23:41: windup 'velocity' does not go with implementation 'positional'",
+        "24:3: 'integral.windup.scheme' is changed by option STRUCTURE as well; let one option do it",
+        "26:38: windup 'none' does not go with implementation 'velocity'",
+    ] == headlines(faults(tmp_path, both))
+
+
+def test_a_forward_rule_unstable_at_the_card_s_own_scan_is_refused(tmp_path: Path) -> None:
+    filters = ("{on: pv, filter: {applies-to: term, ratio: ALPHA}}", "{on: pv, rule: forward, filter: {applies-to: term, time: 0.1}}")
+    text = edited(VALID, filters, *_NO_ALPHA, (", Tf: 2}", ", Tf: 0.1}"))
+    unstable = (
+        "the filter time 0.1 s is not above half the scan interval 1 s, where the forward rule is unstable; "
+        "use a scan interval below 0.2 s or no filter"
+    )
+    assert [f"19:3: with STRUCTURE=I-PD: {unstable}", f"19:3: with STRUCTURE=PID: {unstable}"] == headlines(faults(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [
+        pytest.param((("unit: s, off: inf", "unit: s, range: [0, 0.0001]"), ("RESET: 60", "RESET: 0.0001"), ("ki: 0.0333333", "ki: 20000")), id="tiny"),
+        pytest.param((("unit: s, off: inf", "unit: s, range: [2e4, 3e4]"), ("RESET: 60", "RESET: 2e4"), ("ki: 0.0333333", "ki: 1e-4")), id="huge"),
+        pytest.param(((GAIN, '  GAIN: {sets: gain, unit: "%/%", range: [-9, -1]}\n'), ("{GAIN: 2,", "{GAIN: -2,"), ("{kp: 2, ki: 0.0333333, kd: 32,", "{kp: -2, ki: -0.0333333, kd: -32,")), id="negative"),
+    ],
+)
+def test_a_range_far_from_one_is_no_fault(edits: tuple[Edit, ...], tmp_path: Path) -> None:
+    assert [] == headlines(faults(tmp_path, edited(VALID, *edits)))
+
+
+@pytest.mark.parametrize(
+    ("edits", "expected"),
+    [
+        ((("ratio: ALPHA", "ratio: -2"), *_NO_ALPHA), "11:56: ratio is -2; it is a number from 0 up"),
+        ((("ratio: ALPHA", "time: .nan"), *_NO_ALPHA), "11:55: time is nan; it is a number from 0 up"),
+        (((WINDUP, "{scheme: back-calculation, tracking-time: -5}"),), "10:89: tracking-time is -5; it is a number from 0 up"),
+    ],
+)
+def test_a_number_in_place_of_a_setting_is_checked_as_a_setting_is(edits: tuple[Edit, ...], expected: str, tmp_path: Path) -> None:
+    assert [expected] == headlines(faults(tmp_path, edited(VALID, *edits)))[:1]
