@@ -65,9 +65,9 @@ def dial_values(draw: st.DrawFn, setting: Setting) -> float:
 
 
 @st.composite
-def dials_of(draw: st.DrawFn, name: str) -> dict[str, object]:
+def dials_of(draw: st.DrawFn, card_id: str) -> dict[str, object]:
     """Valid settings of the card of this id, by name, under any choice of its options; choices that it refuses are left out."""
-    card = load_card(name)
+    card = load_card(card_id)
     options = draw(st.sampled_from(option_combinations(card)))
     equation = card.variant(options).equation
     given: dict[str, object] = dict(options)

@@ -42,30 +42,30 @@ def refusal(a_card: Card, **values: object) -> str:
 @pytest.mark.parametrize("number", [2, 2.0, np.float64(2.0), np.int32(2), "2", " 2.0 ", "2 %/%"])
 def test_a_bare_number_is_in_the_dials_own_unit(number: object) -> None:
     settings = given_to(card(), GAIN=number)
-    assert 2.0 == settings["GAIN"].value
-    assert () == settings.notes
+    assert settings["GAIN"].value == 2.0
+    assert settings.notes == ()
 
 
 def test_a_text_with_a_unit_is_converted_and_the_conversion_is_noted() -> None:
     settings = given_to(card(), RATE="30 s")
-    assert 0.5 == settings["RATE"].value
-    assert ("RATE: 30 s is 0.5 min",) == settings.notes
+    assert settings["RATE"].value == 0.5
+    assert settings.notes == ("RATE: 30 s is 0.5 min",)
 
 
 def test_an_integral_time_given_to_a_rate_dial_is_noted_as_its_reciprocal() -> None:
     settings = given_to(card(), RESET="0.5 min")
-    assert 2.0 == settings["RESET"].value
-    assert ("RESET: 0.5 min is 2 repeat/min, the reciprocal, since the dial is in repeat/min",) == settings.notes
+    assert settings["RESET"].value == 2.0
+    assert settings.notes == ("RESET: 0.5 min is 2 repeat/min, the reciprocal, since the dial is in repeat/min",)
 
 
 def test_a_rate_given_in_another_time_base_is_no_reciprocal() -> None:
-    assert ("RESET: 120 repeat/h is 2 repeat/min",) == given_to(card(), RESET="120 repeat/h").notes
+    assert given_to(card(), RESET="120 repeat/h").notes == ("RESET: 120 repeat/h is 2 repeat/min",)
 
 
 def test_a_proportional_band_given_to_a_gain_dial_is_its_reciprocal() -> None:
     settings = given_to(card(), GAIN="40 %")
-    assert 2.5 == settings["GAIN"].value
-    assert ("GAIN: 40 % is 2.5 %/%, the reciprocal, since the dial is in %/%",) == settings.notes
+    assert settings["GAIN"].value == 2.5
+    assert settings.notes == ("GAIN: 40 % is 2.5 %/%, the reciprocal, since the dial is in %/%",)
 
 
 @pytest.mark.parametrize("word", ["off", "OFF", " Off "])
@@ -73,37 +73,37 @@ def test_off_is_the_dials_first_off_value(word: str) -> None:
     settings = given_to(card(RESET={"sets": "integral", "unit": "min/repeat", "off": ["inf", 0]}), RESET=word)
     assert math.inf == settings["RESET"].value
     assert settings["RESET"].off
-    assert 0.0 == settings["RESET"].canonical
-    assert ("RESET: off is inf min/repeat",) == settings.notes
+    assert settings["RESET"].canonical == 0.0
+    assert settings.notes == ("RESET: off is inf min/repeat",)
 
 
 def test_every_off_value_switches_the_term_off() -> None:
     a_card = card(RESET={"sets": "integral", "unit": "min/repeat", "off": [9999, 0]})
-    assert [0.0, 0.0] == [given_to(a_card, RESET=off).algorithm().ki for off in (9999, 0)]
+    assert [given_to(a_card, RESET=off).algorithm().ki for off in (9999, 0)] == [0.0, 0.0]
     assert math.inf == given_to(a_card, RESET=9999)["RESET"].to("s/repeat")
 
 
 def test_a_dial_without_an_off_value_cannot_be_switched_off() -> None:
-    assert "nobody/bench: GAIN: cannot be switched off: the card states no off value" == refusal(card(), GAIN="off")
+    assert refusal(card(), GAIN="off") == "nobody/bench: GAIN: cannot be switched off: the card states no off value"
 
 
 def test_a_dial_that_was_not_given_takes_its_default() -> None:
     rate = given_to(card())["RATE"]
-    assert (0.0, False, True) == (rate.value, rate.given, rate.off)
+    assert (rate.value, rate.given, rate.off) == (0.0, False, True)
 
 
 def test_missing_dials_are_refused_all_at_once_with_what_they_set() -> None:
     with pytest.raises(SettingError) as caught:
         card().settings()
-    assert [
+    assert str(caught.value).splitlines() == [
         "nobody/bench: GAIN: missing; it sets the gain, in %/%",
         "nobody/bench: RESET: missing; it sets the integral, in repeat/min",
-    ] == str(caught.value).splitlines()
+    ]
 
 
 def test_an_unknown_name_is_refused_with_the_nearest_one() -> None:
     message = refusal(card(), RESETT=4)
-    assert "nobody/bench: unknown setting 'RESETT' (did you mean 'RESET'?); settings: GAIN, RESET, RATE" == message
+    assert message == "nobody/bench: unknown setting 'RESETT' (did you mean 'RESET'?); settings: GAIN, RESET, RATE"
 
 
 def test_names_may_be_written_in_upper_or_lower_case() -> None:
@@ -158,12 +158,12 @@ def test_the_ends_of_the_range_belong_to_it(value: float) -> None:
 
 
 def test_an_off_value_may_lie_outside_the_range() -> None:
-    assert 0.0 == given_to(card(), RATE=0)["RATE"].value
+    assert given_to(card(), RATE=0)["RATE"].value == 0.0
     assert refusal(card(), RATE=0.005).endswith("is outside 0.01 to 10 min; 0 switches it off")
 
 
 def test_without_a_range_a_negative_value_is_refused() -> None:
-    assert "nobody/bench: RESET: -1 repeat/min is outside 0 to inf repeat/min; 0 switches it off" == refusal(card(), RESET=-1)
+    assert refusal(card(), RESET=-1) == "nobody/bench: RESET: -1 repeat/min is outside 0 to inf repeat/min; 0 switches it off"
 
 
 def test_zero_on_a_reciprocal_dial_would_be_infinite_action() -> None:
@@ -171,7 +171,7 @@ def test_zero_on_a_reciprocal_dial_would_be_infinite_action() -> None:
 
 
 def test_several_faults_are_told_at_once() -> None:
-    assert ["GAIN", "RATE"] == [line.split(": ")[1] for line in refusal(card(), GAIN=1000, RATE="x").splitlines()]
+    assert [line.split(": ")[1] for line in refusal(card(), GAIN=1000, RATE="x").splitlines()] == ["GAIN", "RATE"]
 
 
 def test_repeats_are_refused_on_a_parallel_integral_gain() -> None:
@@ -182,7 +182,7 @@ def test_repeats_are_refused_on_a_parallel_integral_gain() -> None:
 
 def test_a_value_is_shown_in_any_unit_that_fits() -> None:
     reset = given_to(card())["RESET"]
-    assert [4.0, 15.0, 0.25, 240.0] == [reset.to(u) for u in ("repeat/min", "s/repeat", "min per repeat", "rep/h")]
+    assert [reset.to(u) for u in ("repeat/min", "s/repeat", "min per repeat", "rep/h")] == [4.0, 15.0, 0.25, 240.0]
     with pytest.raises(UnitError, match="cannot set integral"):
         reset.to("%")
 
@@ -209,8 +209,8 @@ def test_engineering_gains_stay_as_they_are_in_the_cards_own_units() -> None:
     )
     settings = a_card.settings(kp=3, ki=0.5, kd=2, pv_range=(0, 200), op_range=(0, 50))
     own, percent = settings.algorithm(own_units=True), settings.algorithm()
-    assert (3.0, 0.5, 2.0) == (own.kp, own.ki, own.kd)
-    assert (12.0, 2.0, 8.0) == (percent.kp, percent.ki, percent.kd)
+    assert (own.kp, own.ki, own.kd) == (3.0, 0.5, 2.0)
+    assert (percent.kp, percent.ki, percent.kd) == (12.0, 2.0, 8.0)
 
 
 @pytest.mark.parametrize("value", [(0,), (100, 0), (0, 0), (0, math.inf), (math.nan, 1), "0..100", "12", 5, (0, "x")])
@@ -238,18 +238,18 @@ def with_option() -> Card:
 
 def test_an_option_takes_its_default_where_the_dials_do_not_speak_against_it() -> None:
     settings = with_option().settings(PB=50, Ti=10)
-    assert {"TYPE": "PB"} == settings.options
-    assert () == settings.notes
+    assert settings.options == {"TYPE": "PB"}
+    assert settings.notes == ()
 
 
 def test_dials_that_exist_under_one_choice_only_imply_it_and_say_so() -> None:
     settings = with_option().settings(G=2, Ti=10)
-    assert {"TYPE": "Gain"} == settings.options
-    assert ("TYPE=Gain, since G, Ti are its settings",) == settings.notes
+    assert settings.options == {"TYPE": "Gain"}
+    assert settings.notes == ("TYPE=Gain, since G, Ti are its settings",)
 
 
 def test_an_option_and_its_choice_may_be_written_in_lower_case() -> None:
-    assert {"TYPE": "Gain"} == with_option().settings(type="gain", g=2, ti=10).options
+    assert with_option().settings(type="gain", g=2, ti=10).options == {"TYPE": "Gain"}
 
 
 def test_a_dial_of_another_choice_is_refused_with_the_choice_made() -> None:
@@ -278,14 +278,14 @@ def test_a_udc_takes_the_option_that_its_gain_or_proportional_band_implies_and_s
 
 
 def test_settings_print_their_active_dials() -> None:
-    assert "<Settings nobody/bench: GAIN=2 %/%, RESET=4 repeat/min, RATE=0 min>" == repr(given_to(card()))
+    assert repr(given_to(card())) == "<Settings nobody/bench: GAIN=2 %/%, RESET=4 repeat/min, RATE=0 min>"
 
 
 @pytest.mark.parametrize("name", pidemu.cards())
 def test_every_example_of_a_card_amounts_to_what_it_says(name: str) -> None:
     a_card = pidemu.load_card(name)
     for example in a_card.data.examples:
-        n0, n1, n2, d1, d2 = a_card.settings(example.given).law().coefficients()
+        n0, n1, n2, d1, _ = a_card.settings(example.given).law().coefficients()
         kp = n1 - n0 * d1  # specs/equations.md, section 3, exact conversion to parallel
         want = example.canonical
         # the card prints six digits

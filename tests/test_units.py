@@ -64,9 +64,7 @@ INTEGRAL_FACTORS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(6
         pytest.param(Role.MULTIPLIER, 3.0, "1", Spans(), 3.0, id="overall multiplier"),
     ],
 )
-def test_a_dial_means_what_section_1_says_and_back(
-    role: Role, dial: float, unit: str, spans: Spans, canonical: float
-) -> None:
+def test_a_dial_means_what_section_1_says_and_back(role: Role, dial: float, unit: str, spans: Spans, canonical: float) -> None:
     assert canonical == to_canonical(role, dial, parse_unit(unit), spans)
     assert dial == from_canonical(role, canonical, parse_unit(unit), spans)
 
@@ -141,7 +139,7 @@ def test_a_quantity_is_a_number_and_a_unit(text: str, number: float, unit: str) 
 
 
 def test_a_quantity_may_leave_its_unit_out() -> None:
-    assert (7.25, None) == parse_quantity("7.25")
+    assert parse_quantity("7.25") == (7.25, None)
 
 
 @pytest.mark.parametrize("text", ["0,5 min", "1,000", "2,5"])
@@ -186,9 +184,9 @@ def test_not_a_number_is_refused() -> None:
 
 
 def test_four_repeats_per_minute_are_exactly_fifteen_seconds_per_repeat() -> None:
-    assert 15.0 == convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["s/repeat"])
-    assert 0.25 == convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["min/repeat"])
-    assert 4.0 == convert_unit(Role.INTEGRAL, 15.0, UNITS["s/repeat"], UNITS["repeat/min"])
+    assert convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["s/repeat"]) == 15.0
+    assert convert_unit(Role.INTEGRAL, 4.0, UNITS["repeat/min"], UNITS["min/repeat"]) == 0.25
+    assert convert_unit(Role.INTEGRAL, 15.0, UNITS["s/repeat"], UNITS["repeat/min"]) == 4.0
 
 
 @given(
@@ -202,9 +200,7 @@ def test_a_reset_rate_becomes_an_integral_time_by_exact_arithmetic_rounded_once(
 
 
 @given(dial=st.sampled_from(DIALS), value=st.floats(1e-9, 1e9), pv=st.floats(0.01, 1e5), op=st.floats(0.01, 1e5))
-def test_a_dial_value_survives_the_way_to_canonical_and_back(
-    dial: tuple[Role, str], value: float, pv: float, op: float
-) -> None:
+def test_a_dial_value_survives_the_way_to_canonical_and_back(dial: tuple[Role, str], value: float, pv: float, op: float) -> None:
     role, unit, spans = dial[0], UNITS[dial[1]], Spans(pv, op)
     there = to_canonical(role, value, unit, spans)
     # each way rounds once, by half a unit in the last place: 2^-53 each, of the value or of its reciprocal
@@ -222,21 +218,19 @@ def test_a_conversion_between_dials_keeps_the_canonical_value(
     old, new, spans = data.draw(units), data.draw(units), Spans(pv, op)
     converted = convert_unit(role, value, old, new, spans)
     # three roundings: the conversion, and one canonical value on either side
-    assert math.isclose(
-        to_canonical(role, value, old, spans), to_canonical(role, converted, new, spans), rel_tol=2**-50
-    )
+    assert math.isclose(to_canonical(role, value, old, spans), to_canonical(role, converted, new, spans), rel_tol=2**-50)
 
 
 @pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if is_reciprocal(r, UNITS[u])])
 def test_zero_and_infinity_change_places_on_a_reciprocal_dial(role: Role, unit: str) -> None:
-    assert 0.0 == to_canonical(role, math.inf, UNITS[unit])
+    assert to_canonical(role, math.inf, UNITS[unit]) == 0.0
     assert math.inf == from_canonical(role, 0.0, UNITS[unit])
     assert math.inf == to_canonical(role, 0.0, UNITS[unit])
 
 
 @pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if not is_reciprocal(r, UNITS[u])])
 def test_zero_and_infinity_stay_themselves_on_a_direct_dial(role: Role, unit: str) -> None:
-    assert 0.0 == to_canonical(role, 0.0, UNITS[unit])
+    assert to_canonical(role, 0.0, UNITS[unit]) == 0.0
     assert math.inf == to_canonical(role, math.inf, UNITS[unit])
 
 
@@ -251,5 +245,5 @@ def test_only_bands_and_integral_times_are_reciprocal() -> None:
 
 
 def test_an_integral_time_of_infinity_is_no_repeats_per_minute() -> None:
-    assert 0.0 == convert_unit(Role.INTEGRAL, math.inf, UNITS["s/repeat"], UNITS["repeat/min"])
+    assert convert_unit(Role.INTEGRAL, math.inf, UNITS["s/repeat"], UNITS["repeat/min"]) == 0.0
     assert math.inf == convert_unit(Role.INTEGRAL, 0.0, UNITS["repeat/min"], UNITS["s/repeat"])

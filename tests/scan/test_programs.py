@@ -1,4 +1,4 @@
-"""Scan programs against the discrete law, against loops written by hand from specs/equations.md, and against their own symmetries."""
+"""Scan programs against the discrete law, loops written by hand from specs/equations.md, and their own symmetries."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None)
     place, order = draw(st.sampled_from(FILTERS))
     kp = draw(gains)
     series = draw(st.booleans()) and kp != 0
-    scheme = windup or draw(st.sampled_from(POSITIONAL_SCHEMES))
+    scheme: Scheme = windup if windup is not None else draw(st.sampled_from(POSITIONAL_SCHEMES))
     rules = [Rule.BACKWARD, Rule.FORWARD] if scheme == "external-reset" else list(Rule)
     b = 0.0 if scheme == "clamp-sum" else draw(weights)
     filter_rule = draw(st.sampled_from(Rule))
@@ -258,7 +258,7 @@ def test_no_windup_scheme_moves_the_integral_of_a_proportional_controller(windup
     a = replace(a, ki=0.0, kd=0.0, Tf=0.0, b=1.0, windup=windup, accumulated=False, load_output=False)
     program = build(a, 1.0, limits=(0.0, 100.0))
     x = record(seed, modes=True)
-    assert 0.0 == states_after(program, x).get("I", 0.0)
+    assert states_after(program, x).get("I", 0.0) == 0.0
     in_auto = x.auto > 0
     assert np.array_equal(np.clip(a.kp * (x.sp - x.pv), 0.0, 100.0)[in_auto], run(program, x)[in_auto])
 
@@ -292,9 +292,7 @@ DECAY = 50 * 0.98 ** np.arange(100_000.0)
 @pytest.mark.parametrize("rule", list(Rule))
 @pytest.mark.parametrize(("place", "order"), FILTERS)
 @pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
-def test_states_decay_to_zero_and_not_to_denormal_numbers(
-    rule: Rule, place: Place, order: Literal[1, 2], velocity: bool
-) -> None:
+def test_states_decay_to_zero_and_not_to_denormal_numbers(rule: Rule, place: Place, order: Literal[1, 2], velocity: bool) -> None:
     a = Algorithm(
         series=False, kp=2.0, ki=0.0, kd=5.0, c=0.0, Tf=20.0, filter_on=place, filter_order=order, velocity=velocity,
         derivative_rule=rule, filter_rule=rule, windup="velocity" if velocity else "none",
@@ -312,7 +310,7 @@ def test_an_integral_that_is_drawn_back_to_zero_arrives_there(rule: Rule, windup
     program = build(a, 1.0, limits=(-100.0, 0.0))
     pv = np.zeros(50_000)
     pv[0] = 50.0  # the start sets I = u - P = 100, and the high limit is 0
-    assert 0.0 == states_after(program, Record(pv * 0, pv, pv * 0 + 1, pv * 0))["I"]
+    assert states_after(program, Record(pv * 0, pv, pv * 0 + 1, pv * 0))["I"] == 0.0
 
 
 # --- windup schemes, by hand from specs/equations.md, sections 4 to 6 ------------------------------------------------
@@ -485,9 +483,7 @@ PI = Algorithm(series=False, kp=2.0, ki=0.1, kd=0.0)
 def test_a_bias_belongs_to_a_positional_controller_without_integral() -> None:
     alone = replace(PI, ki=0.0)
     x = record(5)
-    assert np.array_equal(
-        np.clip(2.0 * (x.sp - x.pv) + 50.0, 0, 100), run(build(alone, 1.0, bias=50.0), x)
-    )
+    assert np.array_equal(np.clip(2.0 * (x.sp - x.pv) + 50.0, 0, 100), run(build(alone, 1.0, bias=50.0), x))
     for a in (PI, replace(alone, velocity=True, windup="velocity")):
         with pytest.raises(ScanError, match="a bias belongs to a positional controller without integral action"):
             build(a, 1.0, bias=50.0)
@@ -519,7 +515,9 @@ def test_a_second_order_forward_filter_is_refused_up_to_the_scan_interval(Tf: fl
 def test_a_proportional_term_in_the_integral_sum_stays_where_there_is_no_integral() -> None:
     a = Algorithm(series=False, kp=2.0, ki=0.0, kd=0.0, b=0.0, windup="clamp-sum", accumulated=True)
     x = record(6, amplitude=10.0)
-    assert np.array_equal(run(build(replace(a, load_output=True), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x))
+    assert np.array_equal(
+        run(build(replace(a, load_output=True), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x)
+    )
 
 
 def test_a_velocity_program_with_every_term_off_holds_its_output() -> None:
@@ -550,8 +548,9 @@ def grown(inner: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
 numbers = st.recursive(leaves, grown, max_leaves=25)
 anything = st.recursive(
     leaves,
-    lambda inner: st.builds(Binary, st.sampled_from(NUMERIC + COMPARING + LOGICAL), inner, inner)
-    | st.builds(Select, inner, inner, inner),
+    lambda inner: (
+        st.builds(Binary, st.sampled_from(NUMERIC + COMPARING + LOGICAL), inner, inner) | st.builds(Select, inner, inner, inner)
+    ),
     max_leaves=12,
 )
 
@@ -618,8 +617,6 @@ def test_the_printed_module_of_every_card_gives_the_same_bits_as_its_compiled_fu
     module: dict[str, Any] = {}
     exec(source(program), module)
     state = list(module["INITIAL"])
-    printed = [
-        module["scan"](state, *(float(signal[n]) for signal in (x.sp, x.pv, x.auto, x.manual))) for n in range(len(x.sp))
-    ]
+    printed = [module["scan"](state, *(float(signal[n]) for signal in (x.sp, x.pv, x.auto, x.manual))) for n in range(len(x.sp))]
     assert run(program, x).tolist() == printed
     assert list(states_after(program, x).values()) == state

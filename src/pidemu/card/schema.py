@@ -105,7 +105,14 @@ def reference() -> str:
     """Return the field reference in Markdown: one table per part of a card."""
     lines: list[str] = []
     for model in _ORDER:
-        lines += [f"### {_heading(model)}", "", (model.__doc__ or "").strip(), "", "| key | value | | meaning |", "|---|---|---|---|"]
+        lines += [
+            f"### {_heading(model)}",
+            "",
+            (model.__doc__ or "").strip(),
+            "",
+            "| key | value | | meaning |",
+            "|---|---|---|---|",
+        ]
         for name, field in model.model_fields.items():
             if model is CardFile and name in Equation.model_fields:
                 continue

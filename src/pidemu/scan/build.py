@@ -107,11 +107,12 @@ def _terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], init
     if a.has_signal_filter and a.filter_on == "measurement":
         y = blocks.lag(b, y, fresh, a.Tf, h, a.filter_rule, a.filter_order, "pv")
     e = b.let("e", sp - y, "error")
-    P: Expr = b.let("P", _weighted(b, a.kp, "kp", a.b, "b", e, sp, y), "proportional term") if a.kp else _zero(b)
+    P: Expr = b.let("P", _proportional(b, a, e, sp, y), "proportional term") if a.kp else _zero(b)
     D = None
     if a.kd:
-        x = b.let("x", _difference(b, a.c, "c", e, sp, y), "signal of the derivative")
-        D = blocks.derivative(b, x, fresh, a.kd, a.Tf if a.has_term_filter else 0.0, h, a.derivative_rule)
+        x, kd = (y, -a.kd) if a.c == 0 else (_difference(b, a.c, "c", e, sp, y), a.kd)
+        x = x if isinstance(x, Name) else b.let("x", x, "signal of the derivative")
+        D = blocks.derivative(b, x, fresh, kd, a.Tf if a.has_term_filter else 0.0, h, a.derivative_rule)
     w: Expr = e
     if a.series and D is not None and a.ki:
         per_gain = b.coefficient("per_kp", 1 / a.kp, "1/kp", "-")
@@ -124,17 +125,14 @@ def _zero(b: Builder) -> Expr:
 
 
 def _difference(b: Builder, weight: float, name: str, e: Expr, sp: Expr, y: Expr) -> Expr:
-    """Return ``weight*sp - y`` in as few operations as the weight allows."""
-    if weight == 1:
-        return e
-    if weight == 0:
-        return 0.0 - y
-    return b.coefficient(name, weight, "setpoint weight", "-") * sp - y
+    """Return ``weight*sp - y``; the weight is not 0."""
+    return e if weight == 1 else b.coefficient(name, weight, "setpoint weight", "-") * sp - y
 
 
-def _weighted(b: Builder, gain: float, gain_name: str, weight: float, name: str, e: Expr, sp: Expr, y: Expr) -> Expr:
-    k = b.coefficient(gain_name, gain, "proportional gain, signed for action", "%/%")
-    return k * _difference(b, weight, name, e, sp, y)
+def _proportional(b: Builder, a: Algorithm, e: Expr, sp: Expr, y: Expr) -> Expr:
+    if a.b == 0:
+        return b.coefficient("minus_kp", -a.kp, "proportional gain on PV, signed for action", "%/%") * y
+    return b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%") * _difference(b, a.b, "b", e, sp, y)
 
 
 def _sum(parts: list[Expr | None]) -> Expr:
@@ -184,12 +182,12 @@ def _accumulated(b: Builder, a: Algorithm, t: Terms) -> tuple[Expr, Expr | None]
     """P on PV, accumulated from its value at the start: into the integral sum, or on its own (section 5, clamp-sum)."""
     y1 = b.state("y1", "measurement at the last scan")
     b.let("y1", select(t.fresh, t.y, y1), "no step from nothing to the first sample")
-    moved = b.let("dP", Name("kp") * (t.y - y1), "what the proportional term moves by")
+    moved = b.let("dP", Name("minus_kp") * (t.y - y1), "what the proportional term moves by")
     b.let("y1", t.y, "kept for the next scan")
     if a.windup == "clamp-sum":
         return b.let("P", 0.0, "the proportional term is in the integral sum"), moved
     own = b.state("P_sum", "accumulated proportional term")
-    return b.let("P_sum", select(t.fresh, 0.0, own) - moved, "proportional term on PV, accumulated"), None
+    return b.let("P_sum", select(t.fresh, 0.0, own) + moved, "proportional term on PV, accumulated"), None
 
 
 def _gated(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr | None) -> Expr | None:
@@ -212,12 +210,12 @@ def _start_and_grow(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, gr
     if a.load_output:
         total = select(t.on, state, t.u)
         total = total if now is None else total + now
-        total = total if moved is None else total - moved
+        total = total if moved is None else total + moved
         b.let("I", total, "integral; at a transfer loaded with the last output (section 6)")
     else:
         start = _sum([t.u - P, None]) if t.D is None else t.u - P - t.D
         grow = state if now is None else state + now
-        grow = grow if moved is None else grow - moved
+        grow = grow if moved is None else grow + moved
         b.let("I", select(t.on, grow, start), "integral; at a transfer u - P - D, bumpless (section 6)")
     if a.windup in ("clamp", "clamp-sum"):
         b.let("I", blocks.limited(state, t.low, t.high), f"{a.windup}: the sum within the output limits (section 5)")

@@ -52,8 +52,24 @@ def specialise(program: Program, known: Mapping[str, float] = IN_AUTOMATIC) -> P
             live.discard(assign.name)
             live.update(names_in(assign.value))
             body.append(assign)
+    body = _named_once(body[::-1], program.output)
     inputs = tuple(q for q in program.inputs if q.name in ("sp", "pv"))
-    return replace(program, inputs=inputs, body=tuple(reversed(body)))
+    return replace(program, inputs=inputs, body=tuple(body))
+
+
+def _named_once(body: list[Assign], output: str) -> list[Assign]:
+    """Compute the output under its own name where the last assignment only copies it from a name set once."""
+    copied = next((a for a in reversed(body) if a.name == output), None)
+    if copied is None or not isinstance(copied.value, Name):
+        return body
+    old = copied.value.id
+    sets = [i for i, a in enumerate(body) if a.name == old]
+    end = body.index(copied)
+    if len(sets) != 1 or any(output in names_in(a.value) for a in body[sets[0] + 1 : end]):
+        return body
+    renamed = {old: Name(output)}
+    rest = [replace(a, value=_fold(a.value, renamed)) for a in body[sets[0] + 1 :] if a is not copied]
+    return [*body[: sets[0]], replace(body[sets[0]], name=output), *rest]
 
 
 def _fold(x: Expr, environment: Mapping[str, Expr]) -> Expr:

@@ -1,0 +1,113 @@
+"""There and back: every card to itself, to the parallel form and back, and from card to card and back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import pidemu
+from pidemu.conversion.convert import Conversion
+from pidemu.errors import ConversionRefusedError
+from pidemu.settings import Settings
+from pidemu.units import Role
+from tests.conversion.support import settings_that_act
+
+ALL = pidemu.cards()
+CORE = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+
+
+def to_itself(s: Settings, **given_: object) -> Conversion:
+    return pidemu.convert(s, s.card, options=s.options, given=given_)
+
+
+@pytest.mark.parametrize("card", ALL)
+@given(data=st.data())
+@settings(max_examples=80)
+def test_a_card_to_itself_is_exact(card: str, data: st.DataObject) -> None:
+    s = settings_that_act(data, pidemu.load_card(card))
+    assert to_itself(s, **module_dials(s)).verdict == "exact"
+
+
+@pytest.mark.parametrize("card", ALL)
+@given(data=st.data())
+@settings(max_examples=60)
+def test_a_card_to_itself_with_its_other_dials_held_gives_the_same_dials(card: str, data: st.DataObject) -> None:
+    s = settings_that_act(data, pidemu.load_card(card))
+    held = {n: v.value for n, v in s.items() if v.active and v.role not in CORE}
+    conversion = to_itself(s, **held)
+    assert conversion.verdict == "exact"
+    if s.equation.proportional.on == "none":
+        return  # gain and times are a product there, no dial has a value of its own
+    for name, value in conversion.settings.items():
+        if value.active and s.equation.form != "series":
+            assert value.canonical == pytest.approx(s[name].canonical, rel=1e-9), name
+    if s.equation.form == "series":
+        found, wanted = (sorted(times(x)) for x in (conversion.settings, s))  # the two times may change places
+        # the roots of a quadratic: where they are equal, rounding of 1e-16 moves them by its square root
+        assert found == pytest.approx(wanted, rel=1e-7)
+
+
+def times(s: Settings) -> tuple[float, float]:
+    integral, derivative = s.by_role(Role.INTEGRAL), s.by_role(Role.DERIVATIVE)
+    rate = integral.canonical if integral is not None else 0.0
+    return (1 / rate if rate else math.inf), (derivative.canonical if derivative is not None else 0.0)
+
+
+@pytest.mark.parametrize("card", ALL)
+@given(data=st.data())
+@settings(max_examples=60)
+def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: str, data: st.DataObject) -> None:
+    s = settings_that_act(data, pidemu.load_card(card))
+    try:
+        there = pidemu.convert(s, "generic/parallel")
+    except ConversionRefusedError:
+        assume(False)
+    assume(there.certificate.feedback.is_exact)
+    multiplier = {n: v.value for n, v in s.items() if v.role is Role.MULTIPLIER}
+    back = pidemu.convert(there.settings, s.card, options=s.options, given={**module_dials(s), **multiplier})
+    assert back.certificate.feedback.is_exact
+    assert back.verdict in ("exact", "exact-feedback")
+    if there.verdict == "exact" and s.equation.proportional.on != "none":
+        assert back.verdict == "exact"
+
+
+def module_dials(s: Settings) -> dict[str, object]:
+    """Dials of the module, which a conversion does not choose."""
+    return {n: v.value for n, v in s.items() if v.active and v.setting.scope == "module"}
+
+
+def deviation(s: Settings, t: Settings, low: float, high: float) -> float:
+    w = np.geomspace(low, high, 500)
+    return float(np.max(np.abs(t.law().response(w) / s.law().response(w) - 1)))
+
+
+@given(data=st.data(), names=st.tuples(st.sampled_from(ALL), st.sampled_from(ALL)))
+@settings(max_examples=250)
+def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObject, names: tuple[str, str]) -> None:
+    a = settings_that_act(data, pidemu.load_card(names[0]))
+    try:
+        there = pidemu.convert(a, names[1])
+        back = pidemu.convert(there.settings, a.card, options=a.options)
+    except ConversionRefusedError:
+        assume(False)
+    bands = [c.certificate.feedback.loop_band for c in (there, back)]
+    low, high = max(b.low for b in bands), min(b.high for b in bands)
+    assert high / low > 100, "both bands are placed by the same effective integral time"
+    bound = math.prod(1 + b.max_deviation for b in bands) - 1
+    # the bands' 300 frequencies do not meet the worst one exactly: 2 % of the deviation
+    assert deviation(a, back.settings, low, high) <= 1.02 * bound + 1e-9
+
+
+@pytest.mark.parametrize("card", ALL)
+@given(data=st.data())
+@settings(max_examples=40)
+def test_what_a_conversion_wrote_reads_back_as_the_same_law(card: str, data: st.DataObject) -> None:
+    conversion = to_itself(settings_that_act(data, pidemu.load_card(card)))
+    s = conversion.settings
+    written = {**s.options, **{n: f"{v.value!r} {v.unit}" for n, v in s.items() if v.active and not v.off}}
+    written |= {n: v.value for n, v in s.items() if v.active and v.off}
+    assert s.card.settings(written).law() == s.law()
