@@ -94,7 +94,7 @@ class Controller:
             limits=output_limits or settings.equation.output.limits,
             bias=bias,
             initial_output=initial_output,
-            title=f"{settings!r}, scan {self.interval:g} s, {action} acting"[1:].replace(">", ""),
+            title=f"{settings.summary}; scan {self.interval:g} s, {action} acting",
         )
         from pidemu.targets.python import compiled
 

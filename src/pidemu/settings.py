@@ -154,9 +154,14 @@ class Settings(Mapping[str, Value]):
         return hash((self.card.id, *self.options.values(), *(v.value for v in self.values())))
 
     def __repr__(self) -> str:
+        return f"<Settings {self.summary}>"
+
+    @property
+    def summary(self) -> str:
+        """Card, dials and options in one line."""
         dials = ", ".join(f"{n}={v.value:g} {v.unit}" for n, v in self.items() if v.active)
         chosen = "".join(f", {n}={c}" for n, c in self.options.items())
-        return f"<Settings {self.card.id}: {dials}{chosen}>"
+        return f"{self.card.id}: {dials}{chosen}"
 
     @property
     def card(self) -> Card:

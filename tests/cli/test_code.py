@@ -20,6 +20,7 @@ _EXAMPLES = [(i, e.given) for i in card_files() for e in pidemu.load_card(i).dat
 def signals(low: float, high: float, count: int = 60) -> list[Scan]:
     """A run with setpoint steps, noise, saturation and two spells in manual."""
     chance = random.Random(7)
+    low, high = max(low, -1000), min(high, 1000)
     middle, width = (low + high) / 2, (high - low) / 2
     found: list[Scan] = []
     for i in range(count):

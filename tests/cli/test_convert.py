@@ -124,9 +124,13 @@ def test_without_a_scan_interval_there_are_no_figures_at_the_scans() -> None:
     assert (found["scan"], found["certificate"]["feedback_at_scan"]) == (None, None)
 
 
-@pytest.mark.parametrize("match", ["exact", "low-frequency", "textbook"])
-def test_the_match_is_the_one_asked_for(match: str) -> None:
-    assert converted(*PROVOX, "--match", match)["match"] == match
+@pytest.mark.parametrize(
+    ("match", "dial"),
+    [("exact", ()), ("textbook", ()), ("low-frequency", ("--set", "ALPHA=0.1"))],
+    ids=["exact", "textbook", "low"],
+)
+def test_the_match_is_the_one_asked_for(match: str, dial: tuple[str, ...]) -> None:
+    assert converted(*PROVOX, "--match", match, *dial)["match"] == match
 
 
 def test_a_refusal_says_why_and_what_would_be_nearest() -> None:
@@ -203,10 +207,8 @@ def test_a_loop_file_says_what_the_command_line_would(folder: Path) -> None:
 
 
 def test_the_command_line_overrides_a_loop_file(folder: Path) -> None:
-    (folder / "loop.yaml").write_text(LOOP, encoding="utf-8")
-    words = ("convert", "--loop", "loop.yaml", "--to", "generic/parallel", "--scan", "2")
-    (folder / "plain.yaml").write_text(LOOP.replace("set: {FORM: Series, ALPHA: 0.1}\n", ""), encoding="utf-8")
-    found = converted("convert", "--loop", "plain.yaml", *words[3:])
+    (folder / "loop.yaml").write_text(LOOP.replace("set: {FORM: Series, ALPHA: 0.1}\n", ""), encoding="utf-8")
+    found = converted("convert", "--loop", "loop.yaml", "--to", "generic/parallel", "--scan", "2")
     assert (found["to"]["card"], found["scan"]) == ("generic/parallel", [2.0, 2.0])
 
 

@@ -36,7 +36,7 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
         print_json([{"card": c.id, "title": c.title, "status": _counts(c)} for c in rows])
     else:
         table(
-            ["card", "", *(s.value for s in Status)],
+            ["card", "controller", *(s.value for s in Status)],
             [[c.id, c.title, *(str(n) for n in _counts(c).values())] for c in rows],
             indent=0,
             right=(2, 3, 4, 5),

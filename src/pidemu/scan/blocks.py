@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from pidemu.card.models import Rule
-from pidemu.scan.program import Assign, Expr, Name, Operand, Program, Quantity, equal, expr, select
+from pidemu.scan.program import Assign, Expr, Name, Operand, Program, Quantity, equal, expr, names_in, select
 
 TINY: Final = 1e-300
 """States smaller than this are set to zero: denormal numbers make a scan many times slower (specs/equations.md, section 7)."""
@@ -46,7 +46,11 @@ class Builder:
         return Name(name)
 
     def program(self) -> Program:
-        """Return the finished program."""
+        """Return the finished program, without states that nothing reads."""
+        read = {name for assign in self._body for name in names_in(assign.value)} | {"u"}
+        unread = self._states.keys() - read
+        self._states = {name: state for name, state in self._states.items() if name in read}
+        self._body = [assign for assign in self._body if assign.name not in unread]
         return Program(
             title=self.title,
             inputs=INPUTS,

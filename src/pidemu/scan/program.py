@@ -6,6 +6,7 @@ both sides are numbers. Truth values are numbers too where they are kept in a st
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -106,6 +107,19 @@ def select(condition: Expr, yes: Operand, no: Operand) -> Expr:
 def equal(left: Operand, right: Operand) -> Expr:
     """Return whether two values are equal (``==`` compares the expressions themselves)."""
     return Binary("==", expr(left), expr(right))
+
+
+def names_in(x: Expr) -> Iterator[str]:
+    """Yield every name that an expression reads."""
+    match x:
+        case Name(id=name):
+            yield name
+        case Select(condition=condition, yes=yes, no=no):
+            for part in (condition, yes, no):
+                yield from names_in(part)
+        case Binary(left=left, right=right):
+            yield from names_in(left)
+            yield from names_in(right)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ order, so its bits are the same; only selects on what is known, copies and unuse
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from pidemu.scan.program import Assign, Binary, Expr, Name, Number, Program, Select
+from pidemu.scan.program import Assign, Binary, Expr, Name, Number, Program, Select, names_in
 
 IN_AUTOMATIC: Final[Mapping[str, float]] = {"auto": 1.0, "on": 1.0, "begun": 1.0}
 """What holds from the second automatic scan on."""
@@ -96,16 +96,3 @@ def _logical(is_and: bool, a: Expr, b: Expr) -> Expr:
         if isinstance(one, Number):
             return other if bool(one.value) == is_and else one
     return Binary("and" if is_and else "or", a, b)
-
-
-def names_in(x: Expr) -> Iterator[str]:
-    """Yield every name that an expression reads."""
-    match x:
-        case Name(id=name):
-            yield name
-        case Select(condition=condition, yes=yes, no=no):
-            for part in (condition, yes, no):
-                yield from names_in(part)
-        case Binary(left=left, right=right):
-            yield from names_in(left)
-            yield from names_in(right)

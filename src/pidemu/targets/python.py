@@ -10,8 +10,8 @@ from functools import lru_cache
 from types import CodeType
 from typing import Any, Final
 
-from pidemu.scan.program import Binary, Expr, Name, Number, Program, Select
-from pidemu.scan.specialise import names_in, specialise
+from pidemu.scan.program import Binary, Expr, Name, Number, Program, Select, names_in
+from pidemu.scan.specialise import specialise
 
 _PRECEDENCE: Final = {
     "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
@@ -101,7 +101,7 @@ def source(program: Program) -> str:
     """
     lines = [f'"""{program.title}"""', ""]
     for quantity, value in zip(program.coefficients, program.values, strict=True):
-        lines.append(f"{quantity.name} = {_literal(value):<24}  # {quantity.text} [{quantity.unit}]")
+        lines.append(f"{f'{quantity.name} = {_literal(value)}':<32}  # {quantity.text} [{quantity.unit}]")
     lines += ["", "# kept from scan to scan"]
     for quantity in program.states:
         lines.append(f"#   {quantity.name:<12} {quantity.text} [{quantity.unit}]")
