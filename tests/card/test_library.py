@@ -44,23 +44,23 @@ def test_a_folder_of_the_user_comes_before_the_built_in_cards(tmp_path: Path) ->
     file = tmp_path / "fisher" / "provox.yaml"
     file.parent.mkdir()
     file.write_text(edited(VALID, ("vendor: Nobody", "vendor: Fisher")), encoding="utf-8")
-    assert "test bench" == load_card("fisher/provox", [tmp_path]).data.product
+    assert load_card("fisher/provox", [tmp_path]).data.product == "test bench"
     assert file == card_files([tmp_path])["fisher/provox"]
-    assert "PROVOX" == load_card("fisher/provox").data.product
+    assert load_card("fisher/provox").data.product == "PROVOX"
 
 
 def test_the_environment_names_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first, second = card_of(tmp_path / "a", "first"), card_of(tmp_path / "b", "second")
     monkeypatch.setenv(ENVIRONMENT, os.pathsep.join(["", str(first), str(second)]))
     assert [first, second, builtin_folder()] == folders()
-    assert "first" == load_card("nobody/bench").data.algorithm
+    assert load_card("nobody/bench").data.algorithm == "first"
 
 
 def test_folders_given_come_before_those_of_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(ENVIRONMENT, str(card_of(tmp_path / "a", "environment")))
     given = [card_of(tmp_path / "b", "given"), card_of(tmp_path / "c", "given later")]
-    assert "given" == load_card("nobody/bench", given).data.algorithm
-    assert "environment" == load_card("nobody/bench").data.algorithm
+    assert load_card("nobody/bench", given).data.algorithm == "given"
+    assert load_card("nobody/bench").data.algorithm == "environment"
 
 
 def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
@@ -84,13 +84,13 @@ def test_a_card_is_loaded_by_its_file(tmp_path: Path) -> None:
 def test_a_card_by_file_needs_no_vendor_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written(tmp_path, VALID)
     monkeypatch.chdir(tmp_path / "nobody")
-    assert "nobody/bench" == load_card("bench.yaml").id
+    assert load_card("bench.yaml").id == "nobody/bench"
 
 
 def test_a_missing_file_is_refused() -> None:
     with pytest.raises(CardNotFoundError) as caught:
         load_card("nowhere/block.yaml")
-    assert "no file 'nowhere/block.yaml'" == str(caught.value)
+    assert str(caught.value) == "no file 'nowhere/block.yaml'"
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_a_card_is_read_again_when_its_file_changes(tmp_path: Path) -> None:
     old = load_card("nobody/bench", [card_of(tmp_path, "old")])
     file = written(tmp_path, edited(VALID, ("algorithm: PID", "algorithm: new")))
     os.utime(file, ns=(1, 1))
-    assert ("old", "new") == (old.data.algorithm, load_card("nobody/bench", [tmp_path]).data.algorithm)
+    assert (old.data.algorithm, load_card("nobody/bench", [tmp_path]).data.algorithm) == ("old", "new")
 
 
 def test_a_wrong_card_is_an_error_with_its_place(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_a_wrong_card_is_an_error_with_its_place(tmp_path: Path) -> None:
     with pytest.raises(CardError) as caught:
         load_card("nobody/bench", [tmp_path])
     assert not isinstance(caught.value, CardNotFoundError)
-    assert [(7, 7)] == [(p.line, p.column) for p in caught.value.problems]
+    assert [(p.line, p.column) for p in caught.value.problems] == [(7, 7)]
 
 
 def test_files_that_are_no_cards_are_not_listed(tmp_path: Path) -> None:
@@ -157,4 +157,4 @@ def test_files_that_are_no_cards_are_not_listed(tmp_path: Path) -> None:
     (tmp_path / "nobody" / "notes.txt").write_text("no card", encoding="utf-8")
     (tmp_path / "nobody" / "old").mkdir()
     (tmp_path / "nobody" / "old" / "bench.yaml").write_text(VALID, encoding="utf-8")
-    assert ["nobody/bench"] == [i for i in cards([tmp_path]) if i not in cards()]
+    assert [i for i in cards([tmp_path]) if i not in cards()] == ["nobody/bench"]

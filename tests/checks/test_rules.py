@@ -366,20 +366,20 @@ def _found_by(room: str, name: str, card: Card) -> set[str]:
 
 def test_faults_of_two_rules_come_in_the_order_of_the_file(tmp_path: Path) -> None:
     text = edited(VALID, ("output: falls", "output: rises"), ("ratio: ALPHA", "ratio: 0.1"), ("[0, 100]", "[1, 0]"))
-    assert ["17:3", "26:3", "28:18"] == [h.split(": ")[0] for h in headlines(faults(tmp_path, text))]
+    assert [h.split(": ")[0] for h in headlines(faults(tmp_path, text))] == ["17:3", "26:3", "28:18"]
 
 
 def test_two_choices_that_break_a_rule_together_are_refused(tmp_path: Path) -> None:
     other = "  EQN:\n    default: A\n    choices: {A: {}, B: {proportional: {on: pv, accumulated: true}}}\naction:\n  names"
     velocity = "{implementation: velocity, integral: {windup: {scheme: velocity}}}"
     text = edited(VALID, ("action:\n  names", other), (CHOICE, velocity))
-    assert ["26:49: 'accumulated' belongs to a positional P on pv"] == headlines(faults(tmp_path, text))
+    assert headlines(faults(tmp_path, text)) == ["26:49: 'accumulated' belongs to a positional P on pv"]
 
 
 def test_two_choices_that_make_no_card_together_are_refused(tmp_path: Path) -> None:
     other = "  UNITS:\n    default: s\n    choices: {s: {}, min: {settings: {ALPHA: {unit: '%'}}}}\naction:\n  names"
     text = edited(VALID, ("action:\n  names", other), (CHOICE, "{settings: {ALPHA: null}, derivative: {filter: null}}"))
-    assert ["26:39: missing key 'sets'"] == headlines(faults(tmp_path, text))
+    assert headlines(faults(tmp_path, text)) == ["26:39: missing key 'sets'"]
 
 
 def test_a_forward_rule_unstable_at_the_card_s_own_scan_is_refused(tmp_path: Path) -> None:
@@ -417,7 +417,7 @@ def test_a_forward_rule_unstable_at_the_card_s_own_scan_is_refused(tmp_path: Pat
     ],
 )
 def test_a_range_far_from_one_is_no_fault(edits: tuple[Edit, ...], tmp_path: Path) -> None:
-    assert [] == headlines(faults(tmp_path, edited(VALID, *edits)))
+    assert headlines(faults(tmp_path, edited(VALID, *edits))) == []
 
 
 @pytest.mark.parametrize(

@@ -287,11 +287,11 @@ TABLES = {
 
 
 def _edits(change: Edit | tuple[Edit, ...]) -> tuple[Edit, ...]:
-    return (change,) if isinstance(change[0], str) else change  # type: ignore[return-value]
+    return (change,) if isinstance(change[0], str) else change
 
 
 def test_the_card_that_the_others_are_made_from_is_right(tmp_path: Path) -> None:
-    assert [] == faults(tmp_path, VALID)
+    assert faults(tmp_path, VALID) == []
 
 
 @pytest.mark.parametrize(
@@ -333,4 +333,4 @@ def test_a_problem_on_the_first_line_is_shown_without_a_line_before(tmp_path: Pa
 
 @pytest.mark.parametrize(("card_id", "file"), card_files().items())
 def test_a_built_in_card_has_no_fault(card_id: str, file: Path) -> None:
-    assert [] == check_file(file, card_id)
+    assert check_file(file, card_id) == []

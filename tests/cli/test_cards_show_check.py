@@ -17,7 +17,8 @@ _COMBINATIONS = [(i, o) for i in card_files() for o in option_combinations(pidem
 
 def test_cards_lists_every_card_on_a_line_of_its_own() -> None:
     header, *lines = told("cards").splitlines()
-    assert header.split() == ["card", "documented", "measured", "inferred", "assumed"]
+    words = header.split()
+    assert (words[0], words[-4:]) == ("card", ["documented", "measured", "inferred", "assumed"])
     assert pidemu.cards() == [line.split()[0] for line in lines]
 
 
@@ -64,7 +65,7 @@ def test_show_prints_every_card_with_every_choice_of_options(card_id: str, optio
     words = [f"{name}={choice}" for name, choice in options.items()]
     text = told("show", card_id, *words)
     assert text.startswith(f"{card_id}   {pidemu.load_card(card_id).title}\n")
-    assert [] == [h for h in ("Equation", "Scan by scan", "Settings", "Evidence", "Sources", "Examples") if f"\n{h}" not in text]
+    assert [h for h in ("Equation", "Scan by scan", "Settings", "Evidence", "Sources", "Examples") if f"\n{h}" not in text] == []
     shown = strict_json(told("show", card_id, *words, "--json"))
     assert (card_id, options) == (shown["card"], shown["options"])
 
@@ -118,7 +119,7 @@ def test_check_prints_every_problem_with_its_place_and_fails(folder: Path) -> No
         "nobody/bench.yaml:28:18: output limits 100 to 0 do not ascend\n"
         "  27 | scan: {default: 1 s}\n"
         "  28 | output: {limits: [100, 0]}\n"
-        "     |                  ^^^^^^^^\n"
+        "     |                  ^\n"
         "  29 | evidence:\n",
     )
 

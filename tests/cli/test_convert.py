@@ -66,8 +66,8 @@ def test_convert_as_json_holds_what_programs_need() -> None:
         "options": {},
     }
     assert {"card", "settings", "options"} == set(found["to"])
-    assert {"FORM": "Standard", "STRUCTURE": "1"} == found["to"]["options"]
-    assert {"value": 20.25, "unit": "s/repeat"} == found["to"]["settings"]["RESET"]
+    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "1"}
+    assert found["to"]["settings"]["RESET"] == {"value": 20.25, "unit": "s/repeat"}
     assert found["verdict"] == "exact-feedback"
     assert {"feedback", "setpoint"} <= set(found["certificate"])
 

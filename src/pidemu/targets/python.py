@@ -58,8 +58,13 @@ def _body(program: Program, indent: str) -> list[str]:
     return lines
 
 
+def _states(program: Program) -> str:
+    names = ", ".join(q.name for q in program.states)
+    return names if len(program.states) > 1 else f"({names},)"
+
+
 def _scan(program: Program) -> list[str]:
-    states = ", ".join(q.name for q in program.states)
+    states = _states(program)
     return [
         f"def scan(state, {', '.join(q.name for q in program.inputs)}):",
         '    """Do one scan; change `state` and return the output."""',
@@ -72,7 +77,7 @@ def _scan(program: Program) -> list[str]:
 
 def _run(program: Program, name: str, *, fast: bool = False) -> list[str]:
     """Return the function for many scans; `fast`: with the coefficients as local names, which are quicker to reach."""
-    states = ", ".join(q.name for q in program.states)
+    states = _states(program)
     signals = ", ".join(f"{q.name}_n" for q in program.inputs)
     arguments = ", ".join(q.name for q in program.inputs)
     used = {n for assign in program.body for n in names_in(assign.value)}
