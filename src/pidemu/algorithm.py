@@ -96,11 +96,12 @@ def check_filters(a: Algorithm, h: float) -> None:
     Raises
     ------
     ScanError
-        ``0 < Tf <= h/2`` with the forward rule.
+        The forward rule with ``0 < Tf <= h/2``, or with ``0 < Tf <= h`` for the second-order filter.
     """
     rules = [a.derivative_rule] if a.has_term_filter else [a.filter_rule] if a.has_signal_filter else []
-    if Rule.FORWARD in rules and a.Tf <= h / 2:
+    share = 0.5 if a.filter_order == 1 else 1.0
+    if Rule.FORWARD in rules and a.Tf <= share * h:
         raise ScanError(
-            f"the filter time {a.Tf:g} s is not above half the scan interval {h:g} s, where the forward rule is unstable; "
-            f"use a scan interval below {2 * a.Tf:g} s or no filter"
+            f"the filter time {a.Tf:g} s is too short for the scan interval {h:g} s: the forward rule is unstable; "
+            f"use a scan interval below {a.Tf / share:g} s or no filter"
         )

@@ -136,10 +136,12 @@ class Controller:
         Raises
         ------
         ScanError
-            Setpoint or measurement is not a finite number.
+            Setpoint or measurement is not a finite number, or the manual output is infinite.
         """
         if not math.isfinite(sp - pv):
             raise ScanError(f"setpoint {sp} and measurement {pv} must be finite numbers")
+        if manual is not None and math.isinf(manual):
+            raise ScanError(f"the manual output {manual} is not a finite number")
         return self._scan(self._state, sp, pv, 1.0 if auto else 0.0, math.nan if manual is None else manual)
 
     def run(
@@ -168,7 +170,8 @@ class Controller:
         Raises
         ------
         ScanError
-            The signals have different lengths, or setpoint or measurement hold what is not a finite number.
+            The signals have different lengths, or setpoint or measurement hold what is not a finite number, or the manual
+            output is infinite.
         """
         columns = [sp, pv, True if auto is None else auto, math.nan if manual is None else manual]
         arrays = [np.asarray(c, dtype=float) for c in columns]
@@ -182,6 +185,8 @@ class Controller:
         bad = np.flatnonzero(~np.isfinite(signals[0]) | ~np.isfinite(signals[1]))
         if bad.size:
             raise ScanError(f"setpoint or measurement is not a finite number in sample {bad[0]} (counted from 0)")
+        if np.isinf(signals[3]).any():
+            raise ScanError(f"the manual output is infinite in sample {np.flatnonzero(np.isinf(signals[3]))[0]} (counted from 0)")
         out = np.empty(signals[0].size)
         auto_on = signals[2] > 0
         edges = [0, *(np.flatnonzero(np.diff(auto_on)) + 1).tolist(), out.size]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,7 +105,8 @@ def _places(path: str, line: int, header: list[str]) -> dict[str, int | None]:
         places[name] = hits[0] if hits else None
     for name in ("sp", "pv"):
         if places[name] is None:
-            raise RecordError(f"{path}:{line}: no column '{name}' among {', '.join(header)}{suggest(name, header)}")
+            split = "; the cells are separated by semicolons, save the file with commas" if ";" in "".join(header) else ""
+            raise RecordError(f"{path}:{line}: no column '{name}' among {', '.join(header)}{suggest(name, header)}{split}")
     return places
 
 
@@ -116,9 +118,13 @@ def _cell(path: str, line: int, text: str, column: str, name: str) -> float:
         raise RecordError(f"{path}:{line}: column {column}: '{text}' is neither 1 (automatic) nor 0 (manual)")
     if not word and name in ("manual", "output"):
         return math.nan
+    if not word:
+        raise RecordError(f"{path}:{line}: column {column}: empty; every sample needs a number")
     try:
         value = float(word)
     except ValueError:
+        if re.fullmatch(r"[+-]?\d+,\d+", word):
+            raise RecordError(f"{path}:{line}: column {column}: '{text}' has a comma; write a decimal point") from None
         raise RecordError(f"{path}:{line}: column {column}: '{text}' is not a number") from None
     if not math.isfinite(value) and name in ("sp", "pv"):
         raise RecordError(f"{path}:{line}: column {column}: '{text}' is not a finite number")

@@ -227,6 +227,7 @@ def _spans(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Sp
 def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     """Read settings and options; see `Card.settings`."""
     given = dict(given)
+    _refuse_twice(card, given)
     pv_range, op_range = (_range(card, name, given.pop(name, None)) for name in RESERVED)
     options = {k: v for k, v in given.items() if _known(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
@@ -260,6 +261,15 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     if faults:
         raise SettingError("\n".join(faults))
     return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted)
+
+
+def _refuse_twice(card: Card, given: Mapping[str, object]) -> None:
+    """Refuse a name given in two spellings."""
+    seen: dict[str, str] = {}
+    for name in given:
+        first = seen.setdefault(name.casefold(), name)
+        if first != name:
+            raise SettingError(f"{card.id}: {first} and {name} are the same setting; give it once")
 
 
 def _known(name: str, known: Mapping[str, Any]) -> str | None:
@@ -298,8 +308,10 @@ def _range(card: Card, name: str, given: object) -> tuple[float, float] | None:
     if given is None:
         return None
     try:
+        if isinstance(given, str):
+            raise ValueError
         low, high = (float(x) for x in given)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SettingError(f"{card.id}: {name}: '{given}' is not a pair of numbers such as (0, 200)") from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise SettingError(f"{card.id}: {name}: {low:g} to {high:g} is no range; give low, then high")
@@ -355,7 +367,10 @@ def _number(given: object, setting: Setting, unit: Unit, spans: Spans, form: For
     if isinstance(given, bool) or not isinstance(given, str | Real):
         raise SettingError(f"'{given}' is not a number, nor a text such as \"20 {unit.name}\"")
     if isinstance(given, Real):
-        return float(given), False, ""
+        try:
+            return float(given), False, ""
+        except OverflowError:
+            raise SettingError(f"{str(given)[:12]}... is too large a number") from None
     if given.strip().casefold() == "off":
         if not off_values(setting):
             raise SettingError("cannot be switched off: the card states no off value")
@@ -377,19 +392,20 @@ def _number(given: object, setting: Setting, unit: Unit, spans: Spans, form: For
 
 def _check(value: Value, written: object) -> None:
     setting, unit = value.setting, value.unit
-    shown = f"{value.value:.6g} {unit}" + (f" (given as {written})" if written is not None else "")
+    unit = "" if unit == "1" else f" {unit}"
+    shown = f"{value.value:.6g}{unit}" + (f" (given as {written})" if written is not None else "")
     if math.isnan(value.value):
         raise SettingError("is not a number (NaN)")
     if value.off:
         return
     low, high = limits(setting)
     if not low <= value.value <= high:
-        allowed = f"{low:g} to {high:g} {unit}"
+        allowed = f"{low:g} to {high:g}{unit}"
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
         raise SettingError(f"{shown} is infinite, and infinity is no off value here")
-    if value.value == 0 and is_reciprocal(value.role, parse_unit(unit)):
+    if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
         raise SettingError(f"{shown} would be infinite action; the smallest value above zero is meant, or another unit")
 
 
@@ -473,6 +489,8 @@ def _filter(settings: Settings, filt: Filter | None, rate: float, time: float) -
         return _pick(settings, filt.time, 0.0), place, filt.order
     base = time / (1 + rate * time) if filt.of == "effective-derivative" else time
     if base == 0:
+        return 0.0, place, filt.order
+    if isinstance(filt.gain, str) and settings[filt.gain].off:
         return 0.0, place, filt.order
     if filt.gain is not None:
         gain = _pick(settings, filt.gain, math.inf)

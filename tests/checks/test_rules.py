@@ -19,10 +19,10 @@ _UNITS = (
     "1, %/%, %, eu, eu/eu, %/eu, ms, ms/repeat, repeat/ms, 1/ms, s, s/repeat, repeat/s, 1/s, "
     "min, min/repeat, repeat/min, 1/min, h, h/repeat, repeat/h, 1/h"
 )
-_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero instead"
+_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero"
 _FILTER_GAIN: tuple[Edit, ...] = (
     ("ratio: ALPHA", "gain: ALPHA"),
-    (ALPHA, '  ALPHA: {sets: filter-gain, unit: "1", off: 0, default: 0}\n'),
+    (ALPHA, '  ALPHA: {sets: filter-gain, unit: "1", default: 0}\n'),
     ("off: 0, default: 0}\n  ALPHA", "off: 0}\n  ALPHA"),
     ("RATE: 16}", "RATE: 16, ALPHA: 8}"),
 )
@@ -389,7 +389,7 @@ def test_a_forward_rule_unstable_at_the_card_s_own_scan_is_refused(tmp_path: Pat
     )
     text = edited(VALID, filters, *_NO_ALPHA, (", Tf: 2}", ", Tf: 0.1}"))
     unstable = (
-        "the filter time 0.1 s is not above half the scan interval 1 s, where the forward rule is unstable; "
+        "the filter time 0.1 s is too short for the scan interval 1 s: the forward rule is unstable; "
         "use a scan interval below 0.2 s or no filter"
     )
     assert [f"19:3: with STRUCTURE=I-PD: {unstable}", f"19:3: with STRUCTURE=PID: {unstable}"] == headlines(faults(tmp_path, text))

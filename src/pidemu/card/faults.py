@@ -19,8 +19,9 @@ def _walk(value: Any, loc: tuple[str | int, ...]) -> tuple[Path_, Any]:
     """Return the part of `loc` that exists in `value`: pydantic mixes names of union branches into it."""
     path: list[str | int] = []
     for step in loc:
-        if (isinstance(value, dict) and step in value) or (isinstance(value, list) and isinstance(step, int)):
-            value = value[step]  # type: ignore[index]
+        in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
+        if in_list or (isinstance(value, dict) and step in value):
+            value = value[step]
             path.append(step)
     return tuple(path), value
 
@@ -47,22 +48,28 @@ def _collect(annotation: Any, path: list[str | int], keys: set[str]) -> None:
         _collect(arg, path[1:] if container and path else path, keys)
 
 
-def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel]) -> str:
+def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel], scheme: object) -> str:
     kind, context = error["type"], error.get("ctx", {})
     shown = f"'{value}'" if isinstance(value, str) else f"{value!r}"
+    if kind == "extra_forbidden":
+        known = _fields(model, path[:-1])
+        if path[-1] in known and scheme is not None:
+            return f"'{path[-1]}' does not go with scheme '{scheme}'"
+        return f"unknown key '{path[-1]}'{suggest(str(path[-1]), known)}"
+    if kind == "missing" and isinstance(error["loc"][-1], int):
+        return _wrong_length(2, len(value))  # every tuple of the language is a pair
+    if kind == "missing":
+        return f"missing key '{error['loc'][-1]}'"
+    shapeless = kind in ("model_type", "dict_type", "model_attributes_type", "list_type", "tuple_type")
+    if (value is None and not shapeless) or kind in ("string_too_short", "too_short"):
+        return "empty; write it, or remove the key"
     match kind:
-        case "extra_forbidden":
-            return f"unknown key '{path[-1]}'{suggest(str(path[-1]), _fields(model, path[:-1]))}"
-        case "missing":
-            return f"missing key '{error['loc'][-1]}'"
+        case "literal_error" if path == ("card",):
+            return f"card language {value} is unknown; this version of pidemu reads 1"
         case "literal_error" | "enum":
-            expected = str(context["expected"])
-            options = [w.strip("' ") for w in expected.replace(" or ", ", ").split(",")]
-            return f"{shown} is not one of {expected}{suggest(str(value), options)}"
+            return _not_one_of(shown, str(value), str(context["expected"]))
         case "union_tag_invalid":
-            expected = str(context["expected_tags"])
-            options = [w.strip("' ") for w in expected.split(",")]
-            return f"'{context['tag']}' is not one of {expected}{suggest(str(context['tag']), options)}"
+            return _not_one_of(f"'{context['tag']}'", str(context["tag"]), str(context["expected_tags"]))
         case "union_tag_not_found":
             return "missing key 'scheme'"
         case "string_type":
@@ -75,14 +82,27 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
             return f"expected a mapping (key: value), found {_kind(value)}"
         case "list_type" | "tuple_type":
             return f"expected a list, found {_kind(value)}"
-        case "string_too_short" | "too_short":
-            return "empty; write it, or remove the key"
+        case "too_long":
+            most = int(context["max_length"])
+            return _wrong_length(most, len(value), most if context.get("field_type") == "Tuple" else 1)
+        case "greater_than":
+            return f"{shown} is not above {'zero' if context['gt'] == 0 else context['gt']}"
         case "string_pattern_mismatch":
             return f"{shown} is not a name: letters, digits and underscores, starting with a letter"
-        case "date_type" | "date_parsing" | "date_from_datetime_parsing":
-            return f"{shown} is not a date such as 2026-11-22"
+        case _ if kind.startswith(("date_", "datetime_")):
+            return f"{str(value) if not isinstance(value, str) else shown} is not a date such as 2026-11-22"
         case _:
             return f"{shown}: {error['msg'][0].lower()}{error['msg'][1:]}"
+
+
+def _not_one_of(shown: str, word: str, expected: str) -> str:
+    options = [w.strip("' ") for w in expected.replace(" or ", ", ").split(",")]
+    return f"{shown} is not one of {expected}{suggest(word, options)}"
+
+
+def _wrong_length(expected: int, found: int, least: int | None = None) -> str:
+    wanted = str(expected) if least in (None, expected) else f"{least} to {expected}"
+    return f"expected {wanted} values, found {found}"
 
 
 def _kind(value: Any) -> str:
@@ -112,23 +132,26 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
     found: dict[tuple[Path_, bool], list[str]] = {}
     for detail in error.errors(include_url=False):
         path, here = _walk(value, detail["loc"])
-        if detail["type"] == "string_pattern_mismatch" and detail["loc"][-1] == "[key]":
-            here = path[-1]
-        at_key = detail["type"] in ("extra_forbidden", "missing", "union_tag_not_found") or detail["loc"][-1] == "[key]"
+        of_key = detail["loc"][-1] == "[key]"
+        at_key = of_key or detail["type"] in ("extra_forbidden", "union_tag_not_found")
+        at_key = at_key or (detail["type"] == "missing" and isinstance(detail["loc"][-1], str))
+        scheme = _walk(value, (*path[:-1], "scheme"))[1] if path and detail["type"] == "extra_forbidden" else None
+        message = _message(detail, path, path[-1] if of_key else here, model, scheme if isinstance(scheme, str) else None)
         messages = found.setdefault((path, at_key), [])
-        message = _message(detail, path, here, model)
         if message not in messages:
             messages.append(message)
     for (path, at_key), messages in found.items():
+        if any(inner[: len(path)] == path and len(inner) > len(path) for inner, _ in found) and not at_key:
+            continue  # one branch of a union dislikes the whole, another says which part
         missing = [m for m in messages if m.startswith("missing")]
-        shown = messages if missing else [_united(messages)]
-        for message in shown:
-            yield document.problem(locate(path), message, at_key=at_key)
+        for message in missing or [_united(messages)]:
+            key = (message.split("'")[1],) if missing else ()
+            yield document.problem(locate((*path, *key)), message, at_key=at_key)
 
 
 def _united(messages: list[str]) -> str:
-    if len(messages) == 1:
+    if len(messages) == 1 or not all(" is not " in m for m in messages):
         return messages[0]
     shown = messages[0].split(" is not ")[0]
-    wants = [m.split(" is not ", 1)[1] for m in messages if " is not " in m]
+    wants = [m.split(" is not ", 1)[1] for m in messages]
     return f"{shown} is not {', nor '.join(w.split(';')[0] for w in wants)}"

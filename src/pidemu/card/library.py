@@ -92,7 +92,7 @@ def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
         file = next((f for d in folders(vendors) if (f := d / f"{name}.yaml").is_file()), None) if _is_id(name) else None
         if file is None:
             known = cards(vendors)
-            hint = suggest(name, known) or suggest(name.rsplit("/", 1)[-1], [k.split("/")[1] for k in known])
+            hint = suggest(name, known) or _suggest_block(name, known)
             raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
     elif not file.is_file():
         raise CardNotFoundError(f"no file '{name}'")
@@ -100,6 +100,12 @@ def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
     if key not in _loaded:
         _loaded[key] = load_file(file)
     return _loaded[key]
+
+
+def _suggest_block(name: str, known: list[str]) -> str:
+    """Suggest the card whose second part is nearest to what was written."""
+    hint = suggest(name.rsplit("/", 1)[-1], [k.split("/")[1] for k in known])
+    return next((f" (did you mean '{k}'?)" for k in known if hint and f"'{k.split('/')[1]}'" in hint), "")
 
 
 def _is_id(name: str) -> bool:

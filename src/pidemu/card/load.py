@@ -297,11 +297,12 @@ def _match(word: str, known: Mapping[str, Any]) -> str | None:
 
 def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]) -> Equation:
     def locate(path: Path_) -> Path_:
-        for option, choice in reversed(list(chosen.items())):
-            where = ("options", option, "choices", choice)
-            if path and _holds(document.value, (*where, *path)):
-                return (*where, *path)
-        return path
+        homes = [(), *(("options", option, "choices", choice) for option, choice in chosen.items())]
+        held = [next(n for n in range(len(path), -1, -1) if _holds(document.value, (*home, *path[:n]))) for home in homes]
+        if not _holds(raw, path):  # a choice took it away
+            held[0] = min(held[0], len(path) - 1)
+        best = max(range(len(homes)), key=lambda i: (held[i], i if held[i] else -i))
+        return (*homes[best], *path)
 
     try:
         return Equation.model_validate(raw)

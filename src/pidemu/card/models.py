@@ -5,11 +5,13 @@ Every field's description is its reference: ``specs/card-language.md`` and ``spe
 
 from __future__ import annotations
 
+import re
 from datetime import date
 from enum import StrEnum
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
 
 def _hyphen(name: str) -> str:
@@ -18,6 +20,12 @@ def _hyphen(name: str) -> str:
 
 def _infinity(value: Any) -> Any:
     return float(value) if value in ("inf", "-inf") else value
+
+
+def _day(value: Any) -> Any:
+    if not (isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value)):  # 2026 and 0 are no days
+        raise PydanticCustomError("date_type", "not a date")
+    return value
 
 
 class Model(BaseModel):
@@ -39,6 +47,8 @@ Number = Annotated[
     BeforeValidator(_infinity),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
 ]
+Day = Annotated[date, BeforeValidator(_day)]
+Flag = Annotated[bool, Field(strict=True)]
 SettingName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
@@ -72,7 +82,7 @@ class Source(Model):
 
     title: Text = Field(description="Title of the document, with number and edition; or name and version of the program.")
     address: Text | None = Field(default=None, description="Where it can be read: address, document number or repository path.")
-    read: date = Field(description="The day it was read.")
+    read: Day = Field(description="The day it was read.")
     note: Text | None = Field(
         default=None, description="What kind of witness it is, where that matters (a forum post, third-party code)."
     )
@@ -103,7 +113,7 @@ class Proportional(Model):
         default=None,
         description="Setpoint weight b where `on: weighted`: a number, or the name of the setting that holds it.",
     )
-    accumulated: bool = Field(
+    accumulated: Flag = Field(
         default=False,
         description="Whether a term on PV is accumulated from its value at the start, `P -= kp (y_n - y_{n-1})`, instead of being "
         "`-kp y_n`. With `windup.scheme: clamp-sum` it accumulates into the integral's own sum.",
@@ -269,7 +279,9 @@ class Setting(Model):
         default="loop",
         description="`module`: a setting that many loops share; conversions leave it at its default unless told otherwise.",
     )
-    resolution: Annotated[float, Field(gt=0)] | None = Field(default=None, description="Smallest step of the dial, in `unit`.")
+    resolution: Annotated[float, Field(gt=0, strict=True)] | None = Field(
+        default=None, description="Smallest step of the dial, in `unit`."
+    )
 
 
 class Option(Model):
@@ -278,8 +290,9 @@ class Option(Model):
     about: Text | None = Field(default=None, description="The vendor's own name or words for it.")
     default: Text = Field(description="The choice taken when none is given.")
     choices: dict[Text, dict[str, Any]] = Field(
+        min_length=1,
         description="What each choice changes: the fields of the algorithm that it overlays, as in the card itself. `filter` and "
-        "`windup` are replaced whole; null removes a key."
+        "`windup` are replaced whole; null removes a key.",
     )
 
 

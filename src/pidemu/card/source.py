@@ -95,7 +95,11 @@ class _Reader:
         self.events: Any = None
 
     def fail(self, mark: Any, message: str, width: int = 1) -> None:
-        self.problems.append(Problem(self.document.path, mark.line + 1, mark.column + 1, message, width, self.document.lines))
+        if mark.line >= len(self.document.lines):  # the parser's mark lies past the text
+            line, column = max(1, len(self.document.lines)), 1
+        else:
+            line, column = mark.line + 1, mark.column + 1
+        self.problems.append(Problem(self.document.path, line, column, message, width, self.document.lines))
 
     def place(self, event: Any) -> Place:
         start, end = event.start_mark, event.end_mark

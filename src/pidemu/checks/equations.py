@@ -47,10 +47,10 @@ def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
         low, high = limits(s)
         if not low < high:
             yield document.problem((*home, "range"), f"range {low:g} to {high:g} does not ascend")
-        if s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
-            yield document.problem((*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and no off value")
-        if s.default is not None and math.isnan(s.default):
+        elif s.default is not None and math.isnan(s.default):
             yield document.problem((*home, "default"), "default is not a number")
+        elif s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
+            yield document.problem((*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and no off value")
     low, high = variant.equation.output.limits
     if not low < high:
         yield document.problem(variant.home(("output", "limits")), f"output limits {low:g} to {high:g} do not ascend")
@@ -90,7 +90,7 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
     for role, needed in roles.items():
         dials = [n for n, s in equation.settings.items() if s.sets == role]
         if needed and not dials:
-            yield document.problem(("settings",), f"no setting sets the {role}", at_key=True)
+            yield document.problem(variant.home(("settings",)), f"no setting sets the {role}", at_key=True)
         if len(dials) > 1:
             yield document.problem(
                 variant.home(("settings", dials[1])), f"'{dials[0]}' and '{dials[1]}' both set the {role}", at_key=True
@@ -98,9 +98,11 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_references(variant: Variant) -> Iterator[Problem]:
-    """A field that names a setting names one with the right role, and every such setting is named."""
+    """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
     equation, document = variant.equation, variant.card.document
     for path, name, role in _references(equation):
+        if isinstance(name, float) and not 0 <= name < math.inf:
+            yield document.problem(variant.home(path), f"{path[-1]} is {name:g}; it is a number from 0 up")
         if not isinstance(name, str) or (role == "tracking-time" and name in ("Ti", "sqrt(Ti Td)")):
             continue
         setting = equation.settings.get(name)
@@ -177,8 +179,11 @@ def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
     example, names = variant.equation.action.example, variant.equation.action.names
     home = variant.home(("action", "example"))
     words = {word: sense for sense, word in names.items()}
+    at_names = variant.home(("action", "names"))
     if set(names) != {"reverse", "direct"}:
-        yield variant.card.document.problem(home, "names needs both 'reverse' and 'direct'", at_key=True)
+        yield variant.card.document.problem(at_names, "names needs both 'reverse' and 'direct'", at_key=True)
+    elif len(words) == 1:
+        yield variant.card.document.problem(at_names, f"reverse and direct have the same name '{names['reverse']}'", at_key=True)
     elif example.name not in words:
         yield variant.card.document.problem(home, f"'{example.name}' is not one of the names: {', '.join(words)}", at_key=True)
     elif example.sp == example.pv:

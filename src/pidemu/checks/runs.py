@@ -9,7 +9,7 @@ from typing import Final
 from pidemu.card.load import Card, Variant, variants
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError, Problem
-from pidemu.settings import Settings, is_active, limits
+from pidemu.settings import Settings, is_active, limits, off_values
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
 """Examples are printed with six digits."""
@@ -22,7 +22,8 @@ def reject_wrong_examples(card: Card) -> Iterator[Problem]:
             law = card.settings(example.given).law()
             n0, n1, n2, d1, d2 = law.coefficients()
         except PidemuError as error:
-            yield card.document.problem(("examples", i, "given"), str(error), at_key=True)
+            for line in str(error).splitlines():
+                yield card.document.problem(("examples", i, "given"), line, at_key=True)
             continue
         if abs(d2) > 1e-12:
             yield card.document.problem(("examples", i), "a second-order filter has no parallel gains; choose settings without it")
@@ -50,17 +51,27 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
             Controller(_plausible(variant)).scan(50.0, 49.0)
         except PidemuError as error:
             if "not defined" not in str(error):
-                yield card.document.problem(("options",), f"{dict(variant.chosen)}: {error}")
+                chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
+                message = f"with {chosen}: {error}" if chosen else str(error)
+                yield card.document.problem(("options",) if chosen else ("settings",), message, at_key=True)
 
 
 def _plausible(variant: Variant) -> Settings:
+    """Return settings with every term of the variant at work."""
     values: dict[str, object] = dict(variant.chosen)
     for name, s in variant.equation.settings.items():
-        if s.default is None and is_active(variant.equation, name, s):
-            low, high = limits(s)
-            middle = math.sqrt(max(low, 1e-3) * min(high, 1e3))
-            values[name] = min(max(1.0, low), high) if low <= 1 <= high else middle
+        if is_active(variant.equation, name, s) and (s.default is None or s.default in off_values(s)):
+            values[name] = _working(*limits(s))
     return variant.card.settings(values)
+
+
+def _working(low: float, high: float) -> float:
+    """Return a value inside a range: 1 where that fits, else something in the middle."""
+    if low <= 1 <= high:
+        return 1.0
+    if math.isinf(high):
+        return low * 2 if low > 0 else low + abs(low) + 1
+    return (low + high) / 2 if math.isfinite(low) else high - abs(high) - 1
 
 
 RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (reject_wrong_examples, reject_unrunnable)

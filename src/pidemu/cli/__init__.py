@@ -8,6 +8,8 @@ from typing import Final
 
 import click
 
+from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError, suggest
+
 _COMMANDS: Final = {
     "cards": "List the cards, and how sure they are.",
     "show": "Show a card as a data sheet, with its evidence.",
@@ -29,6 +31,21 @@ class _Lazy(click.Group):
             return None
         command: click.Command = import_module(f"pidemu.cli.{cmd_name}").command
         return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError:
+            raise click.UsageError(
+                f"no command '{args[0]}'{suggest(args[0], _COMMANDS)}; commands: {', '.join(_COMMANDS)}", ctx
+            ) from None
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # the reader of the pipe had enough
+            sys.stdout = None  # nothing to flush at exit
+            raise SystemExit(0) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         with formatter.section("Commands"):
@@ -67,11 +84,6 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _report(error: Exception) -> int:
     """Print an error of ours and return the exit status; pass on what is none of ours."""
-    from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError
-
-    if isinstance(error, BrokenPipeError):
-        sys.stderr.close()
-        return 0
     if not isinstance(error, PidemuError):
         raise error
     click.echo(f"error: {error}", err=True)

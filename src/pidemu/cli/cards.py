@@ -32,6 +32,8 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
             continue
         if word is None or word.casefold() in f"{card.id} {card.title}".casefold():
             rows.append(card)
+    if not rows and not broken:
+        raise click.UsageError(f"no card holds '{word}'; 'pidemu cards' lists all")
     if as_json:
         print_json([{"card": c.id, "title": c.title, "status": _counts(c)} for c in rows])
     else:
@@ -43,8 +45,6 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
         )
     for message in broken:
         click.echo(f"error: {message}", err=True)
-    if not rows and not broken:
-        raise click.UsageError(f"no card holds '{word}'; 'pidemu cards' lists all")
     if broken:
         raise SystemExit(1)
 

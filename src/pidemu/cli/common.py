@@ -6,8 +6,8 @@ import json
 import math
 import sys
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,7 +15,10 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.errors import SettingError
 
-F = TypeVar("F", bound=Callable[..., Any])
+if TYPE_CHECKING:
+    _PairType = click.ParamType[tuple[float, float]]
+else:
+    _PairType = click.ParamType  # it has no type parameter before click 8.4
 
 vendors_option = click.option(
     "--vendors",
@@ -26,7 +29,7 @@ vendors_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 
 
-class Pair(click.ParamType[tuple[float, float]]):
+class Pair(_PairType):
     """Two numbers with a comma between, such as ``0,200``."""
 
     name = "LOW,HIGH"
@@ -42,7 +45,7 @@ class Pair(click.ParamType[tuple[float, float]]):
         return low, high
 
 
-class Scan(click.ParamType[tuple[float, float]]):
+class Scan(_PairType):
     """One scan interval, or two with a comma between [s]."""
 
     name = "H[,H2]"
@@ -60,8 +63,8 @@ class Scan(click.ParamType[tuple[float, float]]):
         return intervals[0], intervals[-1]
 
 
-def assignments(words: Iterable[str], what: str = "NAME=VALUE") -> dict[str, object]:
-    """Read ``NAME=VALUE`` words.
+def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, object]:
+    """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
 
     Raises
     ------
@@ -73,11 +76,18 @@ def assignments(words: Iterable[str], what: str = "NAME=VALUE") -> dict[str, obj
         name, equals, value = word.partition("=")
         name = name.strip()
         if not equals or not name or not value.strip():
-            raise SettingError(f"'{word}' is not {what}; write for example GAIN=2 or \"RESET=20 s/repeat\"")
-        if name in found:
-            raise SettingError(f"{name} is given twice, {found[name]} and {value}; give it once")
+            raise SettingError(f"'{word}' is not {what}; write for example {such}")
+        first = next((n for n in found if n.casefold() == name.casefold()), None)
+        if first is not None:
+            raise SettingError(f"{name} is given twice, {found[first]} and {value.strip()}; give it once")
         found[name] = value.strip()
     return found
+
+
+def overridden(base: Mapping[str, object], top: Mapping[str, object]) -> dict[str, object]:
+    """Return `base` with the values of `top`, whatever the case of the names."""
+    named = {n.casefold() for n in top}
+    return {**{n: v for n, v in base.items() if n.casefold() not in named}, **top}
 
 
 def split_options(card: Card, given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, object]]:

@@ -17,6 +17,7 @@ from pidemu.cli.common import (
     heading,
     json_option,
     number,
+    overridden,
     print_json,
     split_options,
     table,
@@ -88,8 +89,8 @@ def command(
     wanted = assignments(fixed, "NAME=VALUE after --set")
     if loop_file is not None:
         loop = read_loop(Path(loop_file))
-        card, given = card or loop.card, {**loop.settings, **given}
-        target, wanted = target or loop.to, {**loop.set, **wanted}
+        card, given = card or loop.card, overridden(loop.settings, given)
+        target, wanted = target or loop.to, overridden(loop.set, wanted)
         scan = scan or loop.scan
     if card is None:
         raise click.UsageError(
@@ -128,7 +129,7 @@ def _refused(error: ConversionRefusedError, source: Settings, goal: Card, as_jso
     click.echo("nearest settings, which 'pidemu convert --allow-approximate' gives:", err=True)
     for name, value in nearest.settings.items():
         if value.active:
-            click.echo(f"  {name} = {number(value.value)} {value.unit}", err=True)
+            click.echo(f"  {name} = {number(value.value)} {_unit(value)}".rstrip(), err=True)
     click.echo(f"their cost: up to {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band", err=True)
 
 
@@ -156,6 +157,10 @@ def _chosen(s: Settings) -> str:
     return ", ".join(f"{o}={v}" for o, v in s.options.items())
 
 
+def _unit(v: Value) -> str:
+    return "" if v.unit == "1" else v.unit
+
+
 def _other_units(v: Value) -> str:
     """Return an integral or gain dial in the other usual unit, so that nobody has to convert in the head."""
     if v.off:
@@ -176,7 +181,7 @@ def _other_units(v: Value) -> str:
 def _side(title: str, s: Settings) -> None:
     heading(f"\n{title}: {s.card.title}" + (f"  [{_chosen(s)}]" if s.options else ""))
     rows = [
-        [name, number(v.value), v.unit, _other_units(v), "" if v.given else "card's default"] for name, v in s.items() if v.active
+        [name, number(v.value), _unit(v), _other_units(v), "" if v.given else "card's default"] for name, v in s.items() if v.active
     ]
     table(["", "", "", "", ""], rows, right=(1,))
 
@@ -188,7 +193,7 @@ def _target(c: Conversion) -> None:
     for name, v in s.items():
         if v.active:
             rule = number(book[name].value) if book is not None and name in book else "-"
-            rows.append([name, number(v.value), v.unit, _other_units(v), rule])
+            rows.append([name, number(v.value), _unit(v), _other_units(v), rule])
     table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
 
 

@@ -75,8 +75,11 @@ def command(
     if target is None:
         write_record(record, "emulated", emulated, sys.stdout)
     else:
-        with Path(target).open("w", encoding="utf-8", newline="") as stream:
-            write_record(record, "emulated", emulated, stream)
+        try:
+            with Path(target).open("w", encoding="utf-8", newline="") as stream:
+                write_record(record, "emulated", emulated, stream)
+        except OSError as error:
+            raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
     for note in settings.notes:
         click.echo(f"note: {note}", err=True)
     click.echo(f"{len(emulated)} scans of {number(controller.interval)} s, {action} acting", err=True)

@@ -22,7 +22,7 @@ from pidemu.settings import is_active, off_values
 def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> None:
     """Show CARD (an id such as fisher/provox, or a file) with the options chosen: equation, settings, evidence, what is assumed."""
     found = find(card, vendors)
-    variant = found.variant(assignments(options, "OPTION=CHOICE"))
+    variant = found.variant(assignments(options, "OPTION=CHOICE", "FORM=Series"))
     if as_json:
         print_json(_plain(variant))
         return

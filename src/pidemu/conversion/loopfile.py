@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from pidemu.card.faults import problems
 from pidemu.card.models import Model, Number, Text
 from pidemu.card.source import parse_file
-from pidemu.errors import CardError
+from pidemu.errors import CardError, CardNotFoundError
 
 
 class LoopFile(Model):
@@ -24,7 +24,7 @@ class LoopFile(Model):
     set_: dict[Text, str | Number] = Field(
         default={}, description="Options of the target, and dials that shall have a value.", alias="set"
     )
-    scan: list[Number] | None = Field(
+    scan: Number | list[Number] | None = Field(
         default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
     )
 
@@ -61,12 +61,15 @@ def read_loop(file: Path) -> Loop:
     Raises
     ------
     CardError
-        The file is wrong: every problem, located.
+        The file is missing, or wrong: every problem, located.
     """
+    if not file.is_file():
+        raise CardNotFoundError(f"no file '{file}'")
     document = parse_file(file)
     try:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
-    scan = (loop.scan[0], loop.scan[-1]) if loop.scan else None
+    intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
+    scan = (intervals[0], intervals[-1]) if intervals else None
     return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan)

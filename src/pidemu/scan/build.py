@@ -68,7 +68,7 @@ def build(
     ScanError
         The scan interval, the limits or the bias cannot be used, or the combination is not defined.
     """
-    _check(algorithm, scan, limits, bias)
+    _check(algorithm, scan, limits, bias, initial_output)
     sign = 1.0 if action == "reverse" else -1.0
     a = replace(algorithm, kp=sign * algorithm.kp, ki=sign * algorithm.ki, kd=sign * algorithm.kd)
     b = Builder(title)
@@ -82,9 +82,12 @@ def build(
     return b.program()
 
 
-def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float) -> None:
+def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, initial_output: float) -> None:
     if not (math.isfinite(h) and h > 0):
         raise ScanError(f"scan interval {h:g} s is not a positive number")
+    for name, value in (("bias", bias), ("initial output", initial_output)):
+        if not math.isfinite(value):
+            raise ScanError(f"the {name} {value:g} is not a finite number")
     low, high = limits
     if not low < high:
         raise ScanError(f"output limits {low:g} to {high:g} are no range; give low, then high")
@@ -150,7 +153,7 @@ def _positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Ex
     moved: Expr | None = None
     if a.accumulated and a.kp and a.b == 0:
         P, moved = _accumulated(b, a, t)
-    holds_sum = bool(a.ki) or a.load_output
+    holds_sum = bool(a.ki) or a.load_output or moved is not None
     I: Expr | None = None  # noqa: E741 (the field's symbol)
     grown: Expr | None = None
     if holds_sum:
@@ -208,7 +211,7 @@ def _start_and_grow(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, gr
     """Set the integral at a transfer, let it grow otherwise (section 6)."""
     now = None if a.integral_rule is Rule.FORWARD else grown
     if a.load_output:
-        total = select(t.on, state, t.u)
+        total = select(t.on, state, blocks.limited(t.u, t.low, t.high))
         total = total if now is None else total + now
         total = total if moved is None else total + moved
         b.let("I", total, "integral; at a transfer loaded with the last output (section 6)")
@@ -255,7 +258,8 @@ def _velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
         D1 = b.state("D1", "derivative term at the last scan")
         parts.append(b.let("dD", t.D - D1, "increment of the derivative term"))
         b.let("D1", t.D, "kept for the next scan")
-    du: Expr = b.let("du", select(t.on, _sum(parts), 0.0), "increment; none at a transfer, bumpless (section 6)")
+    moved = _sum(parts) if parts else 0.0
+    du: Expr = b.let("du", select(t.on, moved, 0.0), "increment; none at a transfer, bumpless (section 6)")
     if a.has_signal_filter and a.filter_on == "output":
         du = blocks.lag(
             b,
