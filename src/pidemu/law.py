@@ -115,13 +115,15 @@ def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
     """
     d = op.differentiator(a.Tf if a.filter_on == "term" else 0.0)
     pi = a.ki * op.integrator + a.kp
+    setpoint = a.ki * op.integrator + a.kp * a.b
     if a.series:
         lead = d * a.derivative_per_gain
         feedback = pi * (lead + 1.0)
-        setpoint = pi * (lead * a.c + 1.0) + a.kp * (a.b - 1.0)
+        if a.c:
+            setpoint = pi * (lead * a.c + 1.0) + a.kp * (a.b - 1.0)
     else:
         feedback = pi + d * a.kd
-        setpoint = pi + a.kp * (a.b - 1.0) + d * (a.kd * a.c)
+        setpoint = setpoint + d * (a.kd * a.c)
     if a.filter_on == "measurement":
         feedback = feedback * op.lag(a.Tf, a.filter_order)
     elif a.filter_on == "output":

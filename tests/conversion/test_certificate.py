@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -16,18 +18,41 @@ import pidemu
 from pidemu.cli import cli
 from pidemu.conversion.certificate import Kick, PathComparison
 from pidemu.errors import ConversionRefusedError
-from tests.conversion.support import continuous, difference, settings_that_act
+from pidemu.settings import Settings
+from tests.conversion.support import Floats, continuous, difference, settings_that_act
 
 PROVOX = {"GAIN": 2, "RESET": 4, "RATE": 0.1}
-TERM_FILTERS = ("generic/standard", "generic/parallel", "generic/series", "fisher/provox", "emerson/deltav", "honeywell/udc", "bailey/fc19")
+TERM_FILTERS = (
+    "generic/standard",
+    "generic/parallel",
+    "generic/series",
+    "fisher/provox",
+    "emerson/deltav",
+    "honeywell/udc",
+    "bailey/fc19",
+)
 
 
-def convert(card: str, dials: dict[str, object], target: str, **arguments: object) -> pidemu.Conversion:
+def convert(card: str, dials: Mapping[str, object], target: str, **arguments: object) -> pidemu.Conversion:
     return pidemu.convert(pidemu.load_card(card).settings(**dials), target, **arguments)  # type: ignore[arg-type]
 
 
+POINTS = 300
+"""Frequencies of a band, ends included, evenly in the logarithm."""
+
+
+def figures(source: Settings, target: Settings, w: Floats, *, setpoint: bool) -> tuple[float, float, float] | None:
+    """Deviation, dB and degrees of two block diagrams; `None` for a setpoint path that is zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = continuous(target, w, setpoint=setpoint) / continuous(source, w, setpoint=setpoint)
+    if not np.all(np.isfinite(ratio)) or np.any(ratio == 0):
+        return None
+    deviation, gain, phase = np.abs(ratio - 1), np.abs(20 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))
+    return float(np.max(deviation)), float(np.max(gain)), float(np.max(phase))
+
+
 @given(data=st.data(), names=st.tuples(st.sampled_from(TERM_FILTERS), st.sampled_from(TERM_FILTERS)), textbook=st.booleans())
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_the_figures_are_those_of_the_two_block_diagrams(data: st.DataObject, names: tuple[str, str], textbook: bool) -> None:
     source = settings_that_act(data, pidemu.load_card(names[0]))
     assume(source.equation.proportional.on != "none")
@@ -36,24 +61,32 @@ def test_the_figures_are_those_of_the_two_block_diagrams(data: st.DataObject, na
     except ConversionRefusedError:
         assume(False)
     certificate = conversion.certificate
-    for path, comparison in ((False, certificate.feedback), (True, certificate.setpoint)):
+    for setpoint, comparison in ((False, certificate.feedback), (True, certificate.setpoint)):
         for band in (comparison.loop_band, comparison.full_band):
-            w = np.geomspace(band.low, band.high, 3001)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = continuous(conversion.settings, w, setpoint=path) / continuous(source, w, setpoint=path)
-            if not np.all(np.isfinite(ratio)) or np.any(ratio == 0):
-                continue  # a setpoint path that is zero
-            # ten times as many frequencies: their largest figure is a little larger, never smaller, than that of the certificate's 300
-            for stated, found in (
-                (band.max_deviation, float(np.max(np.abs(ratio - 1)))),
-                (band.gain_db, float(np.max(np.abs(20 * np.log10(np.abs(ratio)))))),
-                (band.phase_deg, float(np.max(np.abs(np.degrees(np.angle(ratio)))))),
-            ):
-                assert stated <= found * (1 + 1e-6) + 1e-9
-                assert found <= stated * 1.02 + 1e-3 * (1 + stated) * bool(stated > 1e-9) + 1e-9
-            there = np.array([band.worst_at])
-            worst = abs(continuous(conversion.settings, there, setpoint=path) / continuous(source, there, setpoint=path) - 1)[0]
-            assert worst == pytest.approx(band.max_deviation, rel=1e-6, abs=1e-9)
+            own = figures(source, conversion.settings, np.geomspace(band.low, band.high, POINTS), setpoint=setpoint)
+            if own is not None:
+                # 1e-6: near a zero on the imaginary axis the response is the small difference of its terms
+                assert (band.max_deviation, band.gain_db, band.phase_deg) == pytest.approx(own, rel=1e-6, abs=1e-8)
+                there = figures(source, conversion.settings, np.array([band.worst_at]), setpoint=setpoint)
+                assert there is not None
+                assert there[0] == pytest.approx(band.max_deviation, rel=1e-6, abs=1e-9)
+
+
+@given(data=st.data(), names=st.tuples(st.sampled_from(TERM_FILTERS), st.sampled_from(TERM_FILTERS)))
+@settings(max_examples=60)
+def test_ten_times_as_many_frequencies_find_no_larger_deviation(data: st.DataObject, names: tuple[str, str]) -> None:
+    source = settings_that_act(data, pidemu.load_card(names[0]))
+    n0, n1, n2, _, _ = source.law().coefficients()
+    assume(n1 * n1 >= 0.1 * 4 * n0 * n2)  # zeros damped by 0.3 and more: a notch narrower than that falls between two frequencies
+    assume(source.equation.proportional.on != "none")
+    try:
+        conversion = pidemu.convert(source, names[1])
+    except ConversionRefusedError:
+        assume(False)
+    for band in (conversion.certificate.feedback.loop_band, conversion.certificate.feedback.full_band):
+        found = figures(source, conversion.settings, np.geomspace(band.low, band.high, 10 * POINTS), setpoint=False)
+        assert found is not None
+        assert found[0] <= band.max_deviation * 1.02 + 1e-9
 
 
 def test_the_loop_band_is_placed_by_the_effective_integral_time() -> None:
@@ -65,10 +98,8 @@ def test_the_loop_band_is_placed_by_the_effective_integral_time() -> None:
 
 
 def test_the_full_band_ends_at_100_over_the_derivative_time_or_at_the_nyquist_frequency() -> None:
-    Td = 9.975 * 0.98246 / 2.7  # m2/m1: m2 = 2 x 0.875 x 6 (1 - 0.75/15) = 9.975 and m1 = 2.7
     without = convert("fisher/provox", PROVOX, "emerson/deltav").certificate.feedback.full_band
-    assert without.high == pytest.approx(100 / (9.975 / 2.7))
-    assert without.high < 100 / Td
+    assert without.high == pytest.approx(100 / (9.975 / 2.7))  # m2 = 2 x 0.875 x 6 (1 - 0.75/15), m1 = 2.7
     at_scan = convert("fisher/provox", PROVOX, "emerson/deltav", scan=(1.0, 0.5)).certificate
     assert at_scan.feedback.full_band.high == pytest.approx(math.pi / 1.0)
     assert at_scan.feedback_at_scan is not None
@@ -148,18 +179,23 @@ def test_a_setpoint_weight_keeps_the_kick() -> None:
     assert held.certificate.setpoint_kick.ratio == pytest.approx(1.35)
 
 
-def test_a_weight_by_the_textbook_rule_is_Ti_over_Ti_plus_Td() -> None:
-    source = {"K": 2, "Ti": 15, "Td": 6, "alpha": 0}
-    conversion = convert("generic/series", source, "generic/standard", given={"c": 0})
-    assert conversion.verdict == "exact-feedback"  # the source's D acts on the error, which c = 0 cannot
-    provox = convert("fisher/provox", PROVOX, "generic/standard", match="textbook")
-    assert provox.settings["b"].value == pytest.approx(15 / 21 * (1 + 0), rel=0.1)
-    assert provox.certificate.setpoint_kick.ratio == pytest.approx(1)
+def test_the_weight_that_keeps_the_kick_of_an_unfiltered_series_form_is_Ti_over_Ti_plus_Td() -> None:
+    source = pidemu.load_card("emerson/deltav").settings(GAIN=2, RESET=15, RATE=6, FORM="Series", ALPHA=0.05)
+    b = pidemu.convert(source, "generic/standard").settings["b"].value
+    # n1 - n0 Tf = K (1 + Td/Ti) whatever the filter on the D term
+    assert b == pytest.approx(15 / (15 + 6))
 
 
 @pytest.mark.parametrize(
     ("kick", "ratio"),
-    [(Kick(2, 3), 1.5), (Kick(0, 0), 1), (Kick(math.inf, math.inf), 1), (Kick(0, 2), math.inf), (Kick(math.inf, 2), 0), (Kick(2, math.inf), math.inf)],
+    [
+        (Kick(2, 3), 1.5),
+        (Kick(0, 0), 1),
+        (Kick(math.inf, math.inf), 1),
+        (Kick(0, 2), math.inf),
+        (Kick(math.inf, 2), 0),
+        (Kick(2, math.inf), math.inf),
+    ],
 )
 def test_the_ratio_of_kicks_that_are_nothing_or_infinite(kick: Kick, ratio: float) -> None:
     assert kick.ratio == ratio
@@ -181,7 +217,7 @@ def test_the_kick_is_the_first_move_of_the_emulated_controller() -> None:
 class TestRescaling:
     """New signal ranges: the same effect in engineering units."""
 
-    RANGES = {"pv": ((0.0, 100.0), (50.0, 250.0)), "op": ((0.0, 80.0), (0.0, 100.0))}
+    RANGES: ClassVar = {"pv": ((0.0, 100.0), (50.0, 250.0)), "op": ((0.0, 80.0), (0.0, 100.0))}
 
     def convert(self, target: str, **options: str) -> pidemu.Conversion:
         source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=self.RANGES["pv"][0], op_range=self.RANGES["op"][0])
@@ -236,7 +272,7 @@ class TestRescaling:
 class TestRounding:
     """The UDC shows hundredths of a minute."""
 
-    SOURCE = {"GAIN": 2, "RESET": 55.1, "RATE": 7.3}
+    SOURCE: ClassVar = {"GAIN": 2, "RESET": 55.1, "RATE": 7.3}
 
     def test_nothing_is_rounded_unasked(self) -> None:
         conversion = convert("emerson/deltav", self.SOURCE, "honeywell/udc")
@@ -268,7 +304,7 @@ class TestRounding:
         assert changed != text
         file = tmp_path / "acme" / "coarse.yaml"
         file.parent.mkdir()
-        file.write_text(changed.replace("K: 0.5, Ti: inf", "K: 0.5, Ti: inf"), encoding="utf-8")
+        file.write_text(changed, encoding="utf-8")
         card = pidemu.load_card("acme/coarse", [tmp_path])
         source = pidemu.load_card("generic/standard").settings(K=2.2, Ti=60)
         assert pidemu.convert(source, card).verdict == "exact"

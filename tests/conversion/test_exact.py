@@ -73,7 +73,12 @@ EXACT = [
     Pair("bailey/fc19", {**BAILEY, "S11": "integral only"}, "generic/standard"),
     Pair("allen-bradley/plc5", {"EQUATION": "ISA", "KC": 2, "TI": 1, "TD": 0.1}, "generic/standard"),
     Pair("arduino/pid", {"Kp": 2, "Ki": 0.1, "Kd": 3}, "generic/parallel"),
-    Pair("arduino/pid", {"Kp": 2, "Ki": 0.1, "Kd": 3, "POn": "P_ON_M"}, "simple-pid/simple-pid", options={"proportional_on_measurement": "true"}),
+    Pair(
+        "arduino/pid",
+        {"Kp": 2, "Ki": 0.1, "Kd": 3, "POn": "P_ON_M"},
+        "simple-pid/simple-pid",
+        options={"proportional_on_measurement": "true"},
+    ),
     Pair("simple-pid/simple-pid", {"Kp": 2, "Ki": 0.1, "Kd": 3, "differential_on_measurement": "false"}, "generic/standard"),
     Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODE": "PI"}, "fisher/provox"),
 ]
@@ -119,10 +124,23 @@ def test_exact_feedback_is_not_said_of_controllers_that_agree_on_setpoint_change
     assert difference(a, b) > 1e-3
 
 
-GENERIC = ("generic/standard", "generic/parallel", "generic/series", "fisher/provox", "emerson/deltav", "honeywell/tdc3000", "bailey/fc19")
+GENERIC = (
+    "generic/standard",
+    "generic/parallel",
+    "generic/series",
+    "fisher/provox",
+    "emerson/deltav",
+    "honeywell/tdc3000",
+    "bailey/fc19",
+)
 
 
-@given(data=st.data(), names=st.tuples(st.sampled_from(GENERIC), st.sampled_from(GENERIC)), scan=st.floats(0.1, 5), seed=st.integers(0, 999))
+@given(
+    data=st.data(),
+    names=st.tuples(st.sampled_from(GENERIC), st.sampled_from(GENERIC)),
+    scan=st.floats(0.1, 5),
+    seed=st.integers(0, 999),
+)
 @settings(max_examples=150)
 def test_the_verdict_at_the_scans_is_what_the_emulated_controllers_show(
     data: st.DataObject, names: tuple[str, str], scan: float, seed: int

@@ -29,6 +29,7 @@ def to_itself(s: Settings, **given_: object) -> Conversion:
 @settings(max_examples=80)
 def test_a_card_to_itself_is_exact(card: str, data: st.DataObject) -> None:
     s = settings_that_act(data, pidemu.load_card(card))
+    assume(has_distinct_times(s))
     assert to_itself(s, **module_dials(s)).verdict == "exact"
 
 
@@ -37,6 +38,9 @@ def test_a_card_to_itself_is_exact(card: str, data: st.DataObject) -> None:
 @settings(max_examples=60)
 def test_a_card_to_itself_with_its_other_dials_held_gives_the_same_dials(card: str, data: st.DataObject) -> None:
     s = settings_that_act(data, pidemu.load_card(card))
+    assume(has_distinct_times(s))
+    Td = times(s)[1]
+    assume(not Td or abs(s.algorithm().Tf / Td - 1) > 1e-6)  # a filter as long as the derivative cancels it: its dial says nothing
     held = {n: v.value for n, v in s.items() if v.active and v.role not in CORE}
     conversion = to_itself(s, **held)
     assert conversion.verdict == "exact"
@@ -47,8 +51,14 @@ def test_a_card_to_itself_with_its_other_dials_held_gives_the_same_dials(card: s
             assert value.canonical == pytest.approx(s[name].canonical, rel=1e-9), name
     if s.equation.form == "series":
         found, wanted = (sorted(times(x)) for x in (conversion.settings, s))  # the two times may change places
-        # the roots of a quadratic: where they are equal, rounding of 1e-16 moves them by its square root
+        # the roots of a quadratic, a millionth apart or more: rounding of 1e-16 moves them by 1e-10
         assert found == pytest.approx(wanted, rel=1e-7)
+
+
+def has_distinct_times(s: Settings) -> bool:
+    """Whether the two times of a series form are apart: a double root moves by 1e-8 when its coefficients are rounded by 1e-16."""
+    Ti, Td = times(s)
+    return s.equation.form != "series" or Ti == math.inf or abs(Td / Ti - 1) > 1e-6
 
 
 def times(s: Settings) -> tuple[float, float]:
@@ -71,7 +81,7 @@ def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: st
     back = pidemu.convert(there.settings, s.card, options=s.options, given={**module_dials(s), **multiplier})
     assert back.certificate.feedback.is_exact
     assert back.verdict in ("exact", "exact-feedback")
-    if there.verdict == "exact" and s.equation.proportional.on != "none":
+    if there.verdict == "exact" and has_distinct_times(s) and s.equation.proportional.on != "none":
         assert back.verdict == "exact"
 
 
@@ -108,6 +118,6 @@ def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObje
 def test_what_a_conversion_wrote_reads_back_as_the_same_law(card: str, data: st.DataObject) -> None:
     conversion = to_itself(settings_that_act(data, pidemu.load_card(card)))
     s = conversion.settings
-    written = {**s.options, **{n: f"{v.value!r} {v.unit}" for n, v in s.items() if v.active and not v.off}}
+    written: dict[str, object] = {**s.options, **{n: f"{v.value!r} {v.unit}" for n, v in s.items() if v.active and not v.off}}
     written |= {n: v.value for n, v in s.items() if v.active and v.off}
     assert s.card.settings(written).law() == s.law()

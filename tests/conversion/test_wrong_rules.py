@@ -75,7 +75,10 @@ def test_values_do_not_stay_as_they_are_when_derivative_is_not_zero(
     old, new = ({v.role: v.canonical for v in s.values() if v.active} for s in (source, conversion.settings))
     assert any(new[role] != pytest.approx(old[role], rel=1e-3) for role in new if role in old)
     unchanged = conversion.settings.card.settings(
-        {**conversion.settings.options, **{n: unit_free(source, v.role, v.unit) for n, v in conversion.settings.items() if v.role in old}}
+        {
+            **conversion.settings.options,
+            **{n: unit_free(source, v.role, v.unit) for n, v in conversion.settings.items() if v.role in old},
+        }
     )
     w = conversion.certificate.feedback.loop_band.worst_at
     wrong, right = (abs(complex(s.law().response(w) / source.law().response(w)) - 1) for s in (unchanged, conversion.settings))
@@ -88,7 +91,9 @@ def unit_free(source: pidemu.Settings, role: object, unit: str) -> float:
 
 
 @pytest.mark.parametrize(("card", "dials", "target", "options"), FORMS[:2])
-def test_without_derivative_only_the_units_change(card: str, dials: dict[str, object], target: str, options: dict[str, object]) -> None:
+def test_without_derivative_only_the_units_change(
+    card: str, dials: dict[str, object], target: str, options: dict[str, object]
+) -> None:
     source = pidemu.load_card(card).settings(**{**dials, "RATE": 0})
     settings = pidemu.convert(source, target, options=options).settings
     assert [settings[n].value for n in ("GAIN", "RESET", "RATE")] == pytest.approx([2, 15, 0])

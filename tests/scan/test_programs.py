@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import pidemu
@@ -125,11 +125,11 @@ def assert_impulse(expected: Floats, actual: Floats) -> None:
 @on_every_card
 @given(data=st.data())
 def test_the_impulse_response_of_every_cards_program_is_that_of_its_law(name: str, data: st.DataObject) -> None:
-    settings = settings_of(data, pidemu.load_card(name))
-    h = data.draw(scans_of(settings.algorithm()))
-    program = build(settings.algorithm(own_units=True), h, limits=WIDE)
+    chosen = settings_of(data, pidemu.load_card(name))
+    h = data.draw(scans_of(chosen.algorithm()))
+    program = build(chosen.algorithm(own_units=True), h, limits=WIDE)
     for path in PATHS:
-        assert_impulse(settings.law(scan=h).impulse(40, path), impulse(program, path, 40))
+        assert_impulse(chosen.law(scan=h).impulse(40, path), impulse(program, path, 40))
 
 
 @given(a=algorithms(h=0.7))
@@ -147,6 +147,41 @@ def test_the_impulse_response_of_any_velocity_program_is_that_of_its_law(a: Algo
         assert_impulse(law_of(a, 0.7).impulse(40, path), impulse(program, path, 40))
 
 
+@pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
+@pytest.mark.parametrize("series", [False, True], ids=["parallel", "series"])
+@pytest.mark.parametrize("rule", list(Rule))
+@pytest.mark.parametrize("integral", list(Rule))
+@pytest.mark.parametrize(("place", "order"), [*FILTERS, ("none", 1)])
+@settings(max_examples=4)
+@given(
+    kp=st.floats(0.05, 10), ki=st.floats(0.01, 1), kd=st.floats(0.05, 10), b=weights, c=weights, Tf=st.floats(1.1, 20),
+    h=st.floats(0.1, 2),
+)  # fmt: skip
+def test_the_impulse_response_is_that_of_the_law_under_every_rule_filter_and_form(
+    velocity: bool, series: bool, rule: Rule, integral: Rule, place: Place | Literal["none"], order: Literal[1, 2],
+    kp: float, ki: float, kd: float, b: float, c: float, Tf: float, h: float,
+) -> None:  # fmt: skip
+    a = Algorithm(
+        series=series,
+        kp=kp,
+        ki=ki,
+        kd=kd,
+        b=b,
+        c=c,
+        Tf=0.0 if place == "none" else Tf * h,
+        filter_on="term" if place == "none" else place,
+        filter_order=order,
+        velocity=velocity,
+        integral_rule=integral,
+        derivative_rule=rule,
+        filter_rule=rule,
+        windup="velocity" if velocity else "none",
+    )
+    program = build(a, h, limits=WIDE)
+    for path in PATHS:
+        assert_impulse(law_of(a, h).impulse(40, path), impulse(program, path, 40))
+
+
 @on_every_card
 @given(data=st.data())
 def test_in_its_own_units_every_card_is_its_percent_law_rescaled_by_the_spans(name: str, data: st.DataObject) -> None:
@@ -154,13 +189,13 @@ def test_in_its_own_units_every_card_is_its_percent_law_rescaled_by_the_spans(na
     default = settings_of(data, card)
     assert default.algorithm() == default.algorithm(own_units=True)
     given: dict[str, object] = {n: v.value for n, v in default.items()} | dict(default.options)
-    settings = card.settings(given, pv_range=(-50, 150), op_range=(0, 50))
-    h = data.draw(scans_of(settings.algorithm()))
-    program = build(settings.algorithm(own_units=True), h, limits=WIDE)
-    engineering = settings.equation.signals == "engineering"
+    chosen = card.settings(given, pv_range=(-50, 150), op_range=(0, 50))
+    h = data.draw(scans_of(chosen.algorithm()))
+    program = build(chosen.algorithm(own_units=True), h, limits=WIDE)
+    engineering = chosen.equation.signals == "engineering"
     percent = 200 / 50 if engineering else 1.0  # output percent per PV percent, from output units per PV unit
     for path in PATHS:
-        assert_impulse(settings.law(scan=h).impulse(40, path), percent * impulse(program, path, 40))
+        assert_impulse(chosen.law(scan=h).impulse(40, path), percent * impulse(program, path, 40))
 
 
 @given(a=algorithms(), seed=seeds)

@@ -53,7 +53,7 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
             if "not defined" not in str(error):
                 chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
                 message = f"with {chosen}: {error}" if chosen else str(error)
-                yield card.document.problem(("options",) if chosen else ("settings",), message, at_key=True)
+                yield card.document.problem(("options",) if chosen else ("settings",), message)
 
 
 def _plausible(variant: Variant) -> Settings:

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-from pidemu.algorithm import Algorithm
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.conversion import match as closed
 from pidemu.conversion.advice import warnings_for
-from pidemu.conversion.certificate import Certificate, Rounded, Verdict, certify
+from pidemu.conversion.certificate import Certificate, Rounded, Verdict
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.nearest import nearest
-from pidemu.conversion.target import Numbers, Target, TargetFilter
+from pidemu.conversion.solve import Match, Solver
+from pidemu.conversion.target import Target
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
-from pidemu.law import Law
 from pidemu.plain import json_safe
 from pidemu.settings import Settings
 from pidemu.units import Role
 
-Match = Literal["exact", "low-frequency", "textbook", "constrained"]
 MATCHES: Final = ("exact", "low-frequency", "textbook")
 """Matches a user may ask for; by default exact where possible, else low-frequency."""
 
@@ -189,15 +184,40 @@ def convert(
     card = load_card(target) if isinstance(target, str) else target
     factor = _rescaling(source, pv_range, op_range)
     scans = (float(scan), float(scan)) if isinstance(scan, int | float) else scan
-    goal = Target(card, options or {}, given or {}, pv_range or source.pv_range, op_range or source.op_range)
-    work = _Work(source, goal, factor, scans)
-    settings, how, refusal = work.solve(match)
+    fixed = {**_shared(source, card), **(given or {})}
+    goal = Target(card, options or {}, fixed, pv_range or source.pv_range, op_range or source.op_range)
+    solver = Solver(source, goal, factor, scans)
+    settings, how, refusal = solver.solve(match)
     if settings is None:
         raise ConversionRefusedError(refusal)
-    conversion = work.finish(settings, how, refusal, round_dials=round_dials)
+    conversion = _conversion(solver, settings, how, refusal, round_dials=round_dials)
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)
     return conversion
+
+
+def _shared(source: Settings, target: Card) -> dict[str, object]:
+    """Return what stays as it is within one card: an overall multiplier, and settings that many loops share."""
+    if source.card.id != target.id:
+        return {}
+    return {n: v.value for n, v in source.items() if v.active and (v.role is Role.MULTIPLIER or v.setting.scope == "module")}
+
+
+def _conversion(solver: Solver, settings: Settings, how: Match, refusal: str, *, round_dials: bool) -> Conversion:
+    """Certify, round if asked, and say what differs."""
+    certificate = solver.certify(settings)
+    if round_dials:
+        rounded, dials = _rounded(settings)
+        before = certificate.feedback if dials else None
+        certificate = replace(solver.certify(rounded), dials=dials, feedback_before_rounding=before)
+        settings = rounded
+    try:
+        book = solver.textbook()
+        textbook = Textbook(book, solver.certify(book))
+    except (NoMatchError, SettingError) as error:
+        textbook = Textbook(None, None, str(error))
+    conversion = Conversion(solver.source, settings, how, certificate, textbook, (), refusal, solver.factor, solver.scans)
+    return replace(conversion, warnings=tuple(warnings_for(conversion)))
 
 
 def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float, float] | None) -> float:
@@ -209,150 +229,6 @@ def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float
         if new is not None and old is not None:
             factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
     return factor
-
-
-def _scaled(a: Algorithm, factor: float) -> Algorithm:
-    return a if factor == 1 else replace(a, kp=a.kp * factor, ki=a.ki * factor, kd=a.kd * factor)
-
-
-class _Work:
-    """One conversion under way."""
-
-    def __init__(self, source: Settings, target: Target, factor: float, scans: tuple[float, float] | None) -> None:
-        self.source = source
-        self.target = target
-        self.factor = factor
-        self.scans = scans
-        self.algorithm = source.algorithm()
-        self.law = Law(self.algorithm)
-        self.scaled = Law(_scaled(self.algorithm, factor))
-        self.at_source_scan = Law(self.algorithm, scans[0]) if scans else None
-
-    def solve(self, match: str | None) -> tuple[Settings | None, Match, str]:
-        """Return the target's settings, how they were found, and why they are only the nearest ones."""
-        try:
-            closed.check_terms(self.algorithm, self.target)
-            if match == "textbook":
-                return self._textbook_settings(), "textbook", ""
-            return (*self._closed(match), "")
-        except (NoMatchError, SettingError) as error:
-            reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
-        numbers = nearest(self.law, self.target, self.factor)
-        if numbers is None:
-            return None, "constrained", f"{reason}; no settings of it come near"
-        try:
-            return self._weighted(numbers), "constrained", reason
-        except SettingError as error:
-            return None, "constrained", f"{reason}; no settings of it come near: {error}"
-
-    def _closed(self, match: str | None) -> tuple[Settings, Match]:
-        why: NoMatchError | SettingError | None = None
-        if self.target.filter.free and match != "low-frequency":
-            try:
-                return self._weighted(closed.exact(self.scaled, self.target)), "exact"
-            except (NoMatchError, SettingError) as error:
-                why = error
-                if match == "exact":
-                    raise
-        try:
-            settings = self._low_frequency()
-        except (NoMatchError, SettingError) as error:
-            raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
-        how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
-        if match == "exact" and how != "exact":
-            raise NoMatchError("its filter is fixed, and no settings give the same law")
-        return settings, how
-
-    def _low_frequency(self) -> Settings:
-        """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""
-        delivered = replace(self.target.filter, free=False)
-        if self.target.filter.free:
-            self.target.filter = self.target.filter.nearest_to(*self._wanted_filter())
-            with suppress(NoMatchError, SettingError):
-                return self._roots(self.target.filter)
-        self.target.filter = delivered
-        return self._roots(delivered)
-
-    def _roots(self, fixed: TargetFilter) -> Settings:
-        """Return the settings of the first solution, or of another where that is the source's own law."""
-        first, *others = closed.low_frequency(self.scaled, self.target, fixed)
-        for numbers in others:
-            with suppress(SettingError):
-                settings = self._with_filter(numbers, fixed)
-                if self._certify(settings).feedback.is_exact:
-                    return settings
-        return self._with_filter(first, fixed)
-
-    def _with_filter(self, numbers: Numbers, fixed: TargetFilter) -> Settings:
-        """Return settings with a filter that was free set to the value it was fixed at."""
-        if fixed.setting is not None and fixed.setting not in self.target.given:
-            numbers = replace(numbers, Tf=self._time_of(fixed, numbers))
-        return self._weighted(numbers)
-
-    def _time_of(self, filt: TargetFilter, numbers: Numbers) -> float:
-        if filt.kind == "time":
-            return float(filt.value)
-        Td = numbers.kd / (numbers.K if numbers.K and self.target.form != "parallel" else 1.0)
-        base = Td / (1 + Td * numbers.ki / numbers.K) if filt.effective and numbers.K else Td
-        return float(filt.ratio * base)
-
-    def _wanted_filter(self) -> tuple[float, float]:
-        """Return the filter time that the next moment asks for, and the derivative time it goes with [s]."""
-        _, m1, m2, m3 = self.scaled.expansion(4)
-        if m2 == 0:
-            return 0.0, 0.0
-        base = m2 / m1 if m1 and self.target.form != "parallel" else m2
-        return max(0.0, -m3 / m2), base
-
-    def _textbook_settings(self) -> Settings:
-        time = self.source.by_role(Role.DERIVATIVE)
-        a = self.algorithm
-        per = 1.0 if self.source.equation.form == "parallel" else a.kp
-        dial_kd = per * time.canonical if time is not None and a.kd and self.source.equation.form != "parallel" else a.kd
-        return self.target.settings(closed.textbook(self.scaled.algorithm, dial_kd * self.factor, self.target))
-
-    def _weighted(self, numbers: Numbers) -> Settings:
-        """Return settings with the setpoint weights that keep the setpoint path, as far as their ranges allow."""
-        settings = self.target.settings(numbers)
-        b, c = closed.weights(self.scaled, self.target, settings.algorithm())
-        if b is None and c is None:
-            return settings
-        return self.target.settings(
-            replace(numbers, b=self._in_range(Role.PROPORTIONAL_WEIGHT, b), c=self._in_range(Role.DERIVATIVE_WEIGHT, c))
-        )
-
-    def _in_range(self, role: Role, weight: float | None) -> float | None:
-        dial = self.target.dial(role)
-        if dial is None or weight is None:
-            return None
-        low, high = dial[1].range or (0.0, 1.0)
-        return min(max(weight, low), high)
-
-    def _certify(self, settings: Settings) -> Certificate:
-        at_scan = None
-        if self.scans and self.at_source_scan:
-            at_scan = (self.at_source_scan, settings.law(self.scans[1]))
-        return certify(self.law, settings.law(), at_scan, self.factor)
-
-    def textbook(self) -> Textbook:
-        """Return what the textbook rule would have given."""
-        try:
-            closed.check_terms(self.algorithm, self.target)
-            settings = self._textbook_settings()
-            return Textbook(settings, self._certify(settings))
-        except (NoMatchError, SettingError) as error:
-            return Textbook(None, None, str(error))
-
-    def finish(self, settings: Settings, how: Match, refusal: str, *, round_dials: bool) -> Conversion:
-        """Certify, round if asked, and say what differs."""
-        certificate = self._certify(settings)
-        if round_dials:
-            rounded, dials = _rounded(settings)
-            before = certificate.feedback
-            certificate = replace(self._certify(rounded), dials=dials, feedback_before_rounding=before if dials else None)
-            settings = rounded
-        conversion = Conversion(self.source, settings, how, certificate, self.textbook(), (), refusal, self.factor, self.scans)
-        return replace(conversion, warnings=tuple(warnings_for(conversion)))
 
 
 def _rounded(settings: Settings) -> tuple[Settings, tuple[Rounded, ...]]:

@@ -40,6 +40,8 @@ def check_terms(source: Algorithm, target: Target) -> None:
         The target lacks integral, derivative or proportional action, or cannot be without proportional action.
     """
     have = f"{target.card.id}{_chosen(target)}"
+    if not (source.kp or source.ki or source.kd):
+        raise NoMatchError("every term of the source is off")
     if source.ki and not target.has_integral:
         raise NoMatchError(f"the source has integral action, {have} has none")
     if source.kd and not target.has_derivative:
@@ -55,8 +57,10 @@ def _chosen(target: Target) -> str:
     return f" ({chosen})" if chosen else ""
 
 
-def exact(law: Law, target: Target) -> Numbers:
+def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     """Return the numbers for which all coefficients of the feedback path agree; the target's filter must be free.
+
+    A series form has two solutions; the one with ``Ti >= Td`` comes first.
 
     Raises
     ------
@@ -67,34 +71,51 @@ def exact(law: Law, target: Target) -> Numbers:
     shape, filt = target.shape, target.filter
     if not filt.free:
         raise NoMatchError("the target's filter is fixed")
-    if not target.has_proportional:
-        raise NoMatchError("the target has no proportional term")
     wanted_d2 = d1 * d1 / 2 if shape.filter_order == 2 and shape.filter_on == "measurement" else 0.0
     if abs(d2 - wanted_d2) > _ROUNDING * max(d1 * d1, abs(d2)):
         raise NoMatchError("the two filters are of different order")
     if shape.filter_on != "term":
-        return _through_signal_filter(n0, n1, n2, d1, target)
+        return tuple(_through_signal_filter(n0, n1, n2, d1, target))
     if shape.series:
-        return _exact_series(n0, n1, n2, d1, filt)
-    kp = n1 - n0 * d1
-    return Numbers(kp, n0, _clean(n2 - kp * d1, n2), d1)
+        return tuple(_exact_series(n0, n1, n2, d1, filt))
+    kp = _clean(n1 - n0 * d1, n1)
+    kd = _clean(n2 - kp * d1, n2)
+    if target.has_proportional:
+        return (Numbers(kp, n0, kd, d1),)
+    return (replace(_without_proportional(n0, kd, target), Tf=d1),)
 
 
 def _clean(difference: float, scale: float) -> float:
     return 0.0 if abs(difference) <= _ROUNDING * abs(scale) else difference
 
 
-def _exact_series(n0: float, n1: float, n2: float, d1: float, filt: TargetFilter) -> Numbers:
-    """Factor the numerator; the larger root is the integral time."""
+def _leads(n0: float, n1: float, n2: float) -> tuple[float, ...]:
+    """Return the time constants that ``n0 + n1 s + n2 s^2`` is factored into, the smaller first: derivative times of a series form.
+
+    Raises
+    ------
+    NoMatchError
+        The zeros are complex.
+    """
     root = n1 * n1 - 4 * n0 * n2
     if root < -_ROUNDING * n1 * n1:
         raise NoMatchError(_complex_zeros(n0, n1, n2), fundamental=True)
-    lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
-    K = n1 - n0 * lead
-    time = lead if filt.lead_lag else lead - d1
-    if time < 0:
-        raise NoMatchError(f"its filter, {d1:.6g} s, is longer than the derivative time {lead:.6g} s of the equivalent series form")
-    return Numbers(K, n0, K * _clean(time, lead), d1)
+    sum_ = n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)
+    if not n2:
+        return (0.0,)
+    return (2 * n2 / sum_, sum_ / (2 * n0)) if n0 else (2 * n2 / sum_,)
+
+
+def _exact_series(n0: float, n1: float, n2: float, d1: float, filt: TargetFilter) -> Iterator[Numbers]:
+    """Factor the numerator; the filter is on the derivative term or the lag of a lead-lag."""
+    for lead in _leads(n0, n1, n2):
+        K = n1 - n0 * lead
+        time = _clean(lead if filt.lead_lag else lead - d1, lead)
+        if time < 0:
+            raise NoMatchError(
+                f"its filter, {d1:.6g} s, is longer than the derivative time {lead:.6g} s of the equivalent series form"
+            )
+        yield Numbers(K, n0, K * time, d1)
 
 
 def _complex_zeros(n0: float, n1: float, n2: float) -> str:
@@ -105,16 +126,15 @@ def _complex_zeros(n0: float, n1: float, n2: float) -> str:
     )
 
 
-def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: Target) -> Numbers:
+def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: Target) -> Iterator[Numbers]:
     """Return the numbers for a target whose filter multiplies the whole feedback path, of ``n0 + n1 s + n2 s^2`` before it."""
+    free = Tf if target.filter.free else None
     if target.form is not Form.SERIES:
-        return Numbers(n1, n0, n2, Tf if target.filter.free else None)
-    root = n1 * n1 - 4 * n0 * n2
-    if root < -_ROUNDING * n1 * n1:
-        raise NoMatchError(_complex_zeros(n0, n1, n2), fundamental=True)
-    lead = 2 * n2 / (n1 + math.copysign(math.sqrt(max(root, 0.0)), n1)) if n2 else 0.0
-    K = n1 - n0 * lead
-    return Numbers(K, n0, K * lead, Tf if target.filter.free else None)
+        yield Numbers(n1, n0, n2, free)
+        return
+    for lead in _leads(n0, n1, n2):
+        K = n1 - n0 * lead
+        yield Numbers(K, n0, K * lead, free)
 
 
 def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers, ...]:
@@ -143,7 +163,7 @@ def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers
     if not target.has_derivative:
         return (Numbers(m1, m0, 0.0),)
     if target.shape.filter_on != "term" and filt.kind != "none":
-        return (_behind_filter(m0, m1, m2, target, filt),)
+        return tuple(_behind_filter(m0, m1, m2, target, filt))
     if target.form is not Form.SERIES:
         return (Numbers(m1, m0, m2),)
     return tuple(_series_roots(m0, m1, m2, filt))
@@ -173,10 +193,10 @@ def _series_roots(m0: float, m1: float, m2: float, filt: TargetFilter) -> Iterat
 def _without_proportional(m0: float, m2: float, target: Target) -> Numbers:
     if target.form is Form.PARALLEL:
         return Numbers(0.0, m0, m2)
-    return Numbers(math.copysign(1.0, m0 or m2), m0, m2)  # the gain only scales the two times: take 1
+    return Numbers(math.copysign(target.idle_gain, m0 or m2), m0, m2)
 
 
-def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: TargetFilter) -> Numbers:
+def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: TargetFilter) -> Iterator[Numbers]:
     """Match the moments of a target whose filter multiplies the whole feedback path."""
     second = 0.5 if target.shape.filter_order == 2 else 1.0
     if filt.kind == "time":
@@ -192,7 +212,7 @@ def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: Target
         raise NoMatchError("its filter is too long for the source's derivative")
     Td = 2 * m2 / (linear + math.copysign(math.sqrt(root), linear or 1.0)) if m2 else 0.0
     K = m1 + m0 * rho * Td
-    return replace(_through_signal_filter(m0, K, K * Td, rho * Td, target), Tf=None)
+    return _through_signal_filter(m0, K, K * Td, rho * Td, target)
 
 
 def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
@@ -221,10 +241,9 @@ def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
         return _without_proportional(ki, kd, target)
     if target.form is not Form.SERIES or not kd:
         return Numbers(kp, ki, kd)
-    root = kp * kp - 4 * ki * kd
-    if root < -_ROUNDING * kp * kp:
+    if kp * kp < 4 * ki * kd * (1 - _ROUNDING):
         raise NoMatchError("the textbook rule needs an integral time of 4 times the derivative time or more")
-    lead = 2 * kd / (kp + math.copysign(math.sqrt(max(root, 0.0)), kp))
+    lead = _leads(ki, kp, kd)[0]
     K = kp - ki * lead
     return Numbers(K, ki, K * lead)
 

@@ -130,6 +130,8 @@ class Target:
         self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
         self.spans = Spans(*(r[1] - r[0] if r else 100.0 for r in (pv_range, op_range)))
         self.form = self.variant.equation.form
+        self.idle_gain = 1.0
+        """Gain taken where there is no proportional term, so that the gain only scales the two times."""
         self._check_given()
         self.filter = self._find_filter()
         """The filter, whether it is free and, once a match has fixed it, its value."""
@@ -228,11 +230,27 @@ class Target:
         for role, value in wanted:
             dial = self.dial(role)
             if dial is not None:
-                dials[dial[0]] = self._to_dial(*dial, value)
+                dials[dial[0]] = self._in_reach(*dial, self._to_dial(*dial, value))
         if n.Tf is not None and self.filter.setting is not None:
             base = time / (1 + rate * time) if self.filter.effective else time
             dials.update(self._filter_dial(n.Tf, base))
         return dials
+
+    def _in_reach(self, name: str, setting: Setting, value: float) -> float:
+        """Return a dial's value, at the end of its range where only rounding keeps it outside.
+
+        Raises
+        ------
+        SettingError
+            It would have to be negative where the dial cannot be.
+        """
+        ends = limits(setting)
+        if value < 0 <= ends[0]:
+            why = (
+                "change the action instead" if setting.sets in ("gain", "multiplier") else "with these filters no positive one fits"
+            )
+            raise SettingError(f"{name} would have to be negative, {value:.6g} {setting.unit}: {why}")
+        return next((end for end in ends if math.isclose(value, end, rel_tol=1e-12)), value)
 
     def _multiplier(self) -> float:
         dial = self.dial(Role.MULTIPLIER)
@@ -245,7 +263,7 @@ class Target:
             if off:
                 return off[0]
             if role is Role.INTEGRAL:
-                raise SettingError(f"{self.card.id}: {name} cannot be switched off: the card states no off value")
+                raise SettingError(f"{name} cannot be switched off: the card states no off value")
         return from_canonical(role, value, parse_unit(setting.unit), self.spans)
 
     def _filter_dial(self, Tf: float, base: float) -> dict[str, float]:
@@ -259,7 +277,7 @@ class Target:
         if f.kind == "ratio":
             return {f.setting: Tf / base}
         if Tf == 0:
-            raise SettingError(f"{self.card.id}: {f.setting} would have to be infinite: this target always filters its derivative")
+            raise SettingError(f"{f.setting} would have to be infinite: this target always filters its derivative")
         return {f.setting: base / Tf}
 
     def algorithm_at(self, K: Any, Ti: Any, Td: Any) -> Algorithm:

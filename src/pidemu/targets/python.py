@@ -40,8 +40,9 @@ def _render(x: Expr) -> tuple[str, int]:
             return f"{then} if {test} else {_wrapped(no, _SELECT)}", _SELECT
         case Binary(operator=operator, left=left, right=right):
             level = _PRECEDENCE[operator]
-            strict = level + 1 if level > 2 else level
-            return f"{_wrapped(left, level)} {operator} {_wrapped(right, strict)}", level
+            compares = level == _PRECEDENCE["<"]  # Python chains comparisons: a < b < c is not (a < b) < c
+            before, after = level + compares, level + (level > _PRECEDENCE["and"])
+            return f"{_wrapped(left, before)} {operator} {_wrapped(right, after)}", level
     raise TypeError(f"no Python for {type(x).__name__}")
 
 
