@@ -30,7 +30,9 @@ def main() -> None:
     ratios = sorted(c / b for b, c in pairs)
     print(f"import numpy, pydantic, yaml   {1000 * base:7.0f} ms")
     print(f"pidemu convert                 {1000 * convert:7.0f} ms")
-    print(f"ratio of medians               {convert / base:7.2f}   (quartiles {ratios[ROUNDS // 4]:.2f} to {ratios[3 * ROUNDS // 4]:.2f}; at most 2.5)")
+    print(
+        f"ratio of medians               {convert / base:7.2f}   (quartiles {ratios[ROUNDS // 4]:.2f} to {ratios[3 * ROUNDS // 4]:.2f}; at most 2.5)"
+    )
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from pidemu.algorithm import Algorithm, Place
 from pidemu.card.load import Card
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
-from pidemu.law import Law, law_of
+from pidemu.law import Law
 from pidemu.settings import Settings
 from tests.helpers import made_up_card, scans_of, settings_of
 
@@ -271,16 +271,16 @@ def test_coefficients_and_moments_of_a_standard_card_with_its_own_filter_time_ar
 
 
 def test_the_setpoint_kick_of_a_series_controller_with_derivative_on_the_measurement_is_its_gain() -> None:
-    law = law_of(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, c=0.0, Tf=1.0))
+    law = Law(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, c=0.0, Tf=1.0))
     assert law.kick() == 2.0
-    with_weight = law_of(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, b=0.25, c=0.0, Tf=1.0))
+    with_weight = Law(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, b=0.25, c=0.0, Tf=1.0))
     assert with_weight.kick() == 0.5
 
 
 def test_the_setpoint_kick_of_a_filtered_derivative_on_error_is_finite_and_of_an_unfiltered_one_infinite() -> None:
-    assert law_of(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0, Tf=1.5)).kick() == 2.0 + 6.0 / 1.5
-    assert math.inf == law_of(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0)).kick()
-    assert -math.inf == law_of(Algorithm(series=False, kp=-2.0, ki=-0.1, kd=-6.0)).kick()
+    assert Law(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0, Tf=1.5)).kick() == 2.0 + 6.0 / 1.5
+    assert math.inf == Law(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0)).kick()
+    assert -math.inf == Law(Algorithm(series=False, kp=-2.0, ki=-0.1, kd=-6.0)).kick()
 
 
 # --- the discrete law ------------------------------------------------------------------------------------------------
@@ -374,7 +374,7 @@ def test_the_discrete_law_is_that_of_the_difference_equations(
     assume(not forward or not a.Tf or a.Tf > h)
     w = np.array([part * math.pi / h])
     z = np.exp(1j * w * h)
-    law = law_of(a, scan=h)
+    law = Law(a, scan=h)
     feedback, setpoint = z_drawn(a, h)
     # near a filter's own resonance, and at high frequency under the forward rule, the terms are larger than they are in s
     s = np.abs((z - 1) / h)
@@ -406,7 +406,7 @@ def test_the_discrete_law_is_accurate_at_the_slow_end_of_the_loop_band(x: Number
     one = -np.expm1(-1j * angle)  # 1 - q, without cancellation
     s = {Rule.BACKWARD: one / h, Rule.FORWARD: one / (h * q), Rule.TRAPEZOIDAL: 2 / h * one / (1 + q)}[rule]
     exact = a.kp + a.ki * h / one + a.kd * s / (1 + a.Tf * s)
-    got = law_of(a, scan=h).response(angle / h)
+    got = Law(a, scan=h).response(angle / h)
     assert abs(exact - got) <= 1e-10 * abs(exact)  # a tenth of what an exact conversion may deviate by
 
 
@@ -432,20 +432,20 @@ def test_the_impulse_response_of_every_card_transforms_to_its_discrete_law(
 def test_an_unstable_forward_filter_is_refused_with_the_interval_that_would_do(Tf: float) -> None:
     a = Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0, Tf=Tf, derivative_rule=Rule.FORWARD)
     with pytest.raises(ScanError, match=f"use a scan interval below {2 * Tf:g} s or no filter"):
-        law_of(a, scan=1.0)
+        Law(a, scan=1.0)
 
 
 @pytest.mark.parametrize("scan", [0.0, -1.0, math.nan, math.inf])
 def test_a_scan_interval_must_be_a_positive_number(scan: float) -> None:
     with pytest.raises(ScanError, match="is not a positive number"):
-        law_of(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0), scan=scan)
+        Law(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0), scan=scan)
 
 
 def test_each_law_refuses_what_belongs_to_the_other() -> None:
     a = Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0)
     with pytest.raises(ValueError, match="the continuous law has no samples"):
-        law_of(a).impulse(3)
-    discrete: Law = law_of(a, scan=1.0)
+        Law(a).impulse(3)
+    discrete: Law = Law(a, scan=1.0)
     with pytest.raises(ValueError, match="this is the discrete law"):
         discrete.coefficients()
     with pytest.raises(ValueError, match="this is the discrete law"):
@@ -454,4 +454,4 @@ def test_each_law_refuses_what_belongs_to_the_other() -> None:
 
 def test_a_path_that_is_not_there_is_refused() -> None:
     with pytest.raises(ValueError, match="it is 'feedback' or 'setpoint'"):
-        law_of(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0)).response(1.0, "both")  # type: ignore[arg-type]
+        Law(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0)).response(1.0, "both")  # type: ignore[arg-type]

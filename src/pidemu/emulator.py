@@ -138,7 +138,7 @@ class Controller:
         ScanError
             Setpoint or measurement is not a finite number, or the manual output is infinite.
         """
-        if not math.isfinite(sp - pv):
+        if not (math.isfinite(sp) and math.isfinite(pv)):
             raise ScanError(f"setpoint {sp} and measurement {pv} must be finite numbers")
         if manual is not None and math.isinf(manual):
             raise ScanError(f"the manual output {manual} is not a finite number")

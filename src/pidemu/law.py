@@ -387,6 +387,3 @@ def _trim(coefficients: Sequence[float]) -> list[float]:
     while len(trimmed) > 1 and trimmed[-1] == 0:
         trimmed.pop()
     return trimmed
-
-
-law_of = Law

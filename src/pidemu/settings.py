@@ -466,7 +466,7 @@ def _algorithm(settings: Settings, *, own_units: bool) -> Algorithm:
         derivative_rule=equation.derivative.rule,
         filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
         windup=_scheme(windup.scheme),
-        tracking_time=_tracking(settings, rate, time, gain) if rate else 0.0,
+        tracking_time=_tracking(settings, rate, time, kp, ki, kd) if ki else 0.0,
         accumulated=equation.proportional.accumulated,
         load_output=equation.transfer.start == "load-output",
         restarted=equation.transfer.derivative == "restarted",
@@ -502,15 +502,14 @@ def _filter(settings: Settings, filt: Filter | None, rate: float, time: float) -
     return base * _pick(settings, filt.ratio, 0.0), place, filt.order
 
 
-def _tracking(settings: Settings, rate: float, time: float, gain: float) -> float:
+def _tracking(settings: Settings, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
     """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
-    parallel = settings.equation.form is Form.PARALLEL
-    integral_time = gain / rate if parallel and gain else 1 / rate
-    derivative_time = time / gain if parallel and gain else time
+    parallel = settings.equation.form is Form.PARALLEL and kp != 0
+    integral_time, derivative_time = (kp / ki, kd / kp) if parallel else (1 / rate, time)
     windup = settings.equation.integral.windup
     given = windup.tracking_time if isinstance(windup, WindupBackCalculation) else "Ti"
     if given == "Ti":
-        return integral_time
+        return abs(integral_time)
     if given == "sqrt(Ti Td)":
-        return math.sqrt(integral_time * derivative_time) if time else integral_time
+        return math.sqrt(abs(integral_time * derivative_time)) if derivative_time else abs(integral_time)
     return _pick(settings, given, integral_time)

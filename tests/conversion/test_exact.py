@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.errors import ConversionRefusedError
+from pidemu.errors import ConversionRefusedError, ScanError
 from tests.conversion.support import difference, outputs, random_signal, settings_that_act
 
 ROUNDING = 1e-9
@@ -154,7 +154,10 @@ def test_the_verdict_at_the_scans_is_what_the_emulated_controllers_show(
     sp, pv = random_signal(seed, 120), random_signal(seed + 1000, 120)
     if conversion.verdict == "exact-feedback":
         sp = np.full(120, 50.0)
-    a, b = (outputs(s, sp, pv, scan) for s in (conversion.source, conversion.settings))
+    try:
+        a, b = (outputs(s, sp, pv, scan) for s in (conversion.source, conversion.settings))
+    except ScanError:  # one of them cannot run at this interval, and says so
+        assume(False)
     if not conversion.source.algorithm().ki:  # positional: counted from the bias; velocity: from the output at the transfer
         a, b = a - a[0], b - b[0]
     # the law's verdict is relative, per frequency, to 1e-9; an output adds up 120 scans of it

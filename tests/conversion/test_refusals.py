@@ -122,7 +122,13 @@ RANGE = [
         "honeywell/udc",
         "GAIN: 2000 %/% is outside 0.001 to 1000",
     ),
-    Refusal("derivative 30 times the integral time", "honeywell/tdc3000", {"K": 1, "T1": 1, "T2": 30}, "emerson/deltav", "RATE: -"),
+    Refusal(
+        "derivative 30 times the integral time",
+        "honeywell/tdc3000",
+        {"K": 1, "T1": 1, "T2": 30},
+        "emerson/deltav",
+        "RATE would have to be negative",
+    ),
 ]
 """A range of a dial left; in the last one a closed form asks for a negative derivative."""
 

@@ -16,7 +16,7 @@ import pidemu
 from pidemu.algorithm import Algorithm, Place, Scheme
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
-from pidemu.law import law_of
+from pidemu.law import Law
 from pidemu.scan.build import build
 from pidemu.scan.program import Binary, Expr, Name, Number, Operator, Program, Select
 from pidemu.targets.python import compiled, render, source
@@ -136,7 +136,7 @@ def test_the_impulse_response_of_every_cards_program_is_that_of_its_law(name: st
 def test_the_impulse_response_of_any_positional_program_is_that_of_its_law(a: Algorithm) -> None:
     program = build(a, 0.7, limits=WIDE)
     for path in PATHS:
-        assert_impulse(law_of(a, 0.7).impulse(40, path), impulse(program, path, 40))
+        assert_impulse(Law(a, 0.7).impulse(40, path), impulse(program, path, 40))
 
 
 @given(a=algorithms(h=0.7))
@@ -144,7 +144,7 @@ def test_the_impulse_response_of_any_velocity_program_is_that_of_its_law(a: Algo
     a = replace(a, velocity=True, windup="velocity", accumulated=False, load_output=False)
     program = build(a, 0.7, limits=WIDE)
     for path in PATHS:
-        assert_impulse(law_of(a, 0.7).impulse(40, path), impulse(program, path, 40))
+        assert_impulse(Law(a, 0.7).impulse(40, path), impulse(program, path, 40))
 
 
 @pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
@@ -179,7 +179,7 @@ def test_the_impulse_response_is_that_of_the_law_under_every_rule_filter_and_for
     )
     program = build(a, h, limits=WIDE)
     for path in PATHS:
-        assert_impulse(law_of(a, h).impulse(40, path), impulse(program, path, 40))
+        assert_impulse(Law(a, h).impulse(40, path), impulse(program, path, 40))
 
 
 @on_every_card
@@ -544,7 +544,7 @@ def test_a_second_order_forward_filter_is_refused_up_to_the_scan_interval(Tf: fl
     with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
         build(a, 1.0)
     with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
-        law_of(a, 1.0)
+        Law(a, 1.0)
 
 
 def test_a_proportional_term_in_the_integral_sum_stays_where_there_is_no_integral() -> None:

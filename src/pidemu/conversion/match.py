@@ -41,7 +41,7 @@ def check_terms(source: Algorithm, target: Target) -> None:
     """
     have = f"{target.card.id}{_chosen(target)}"
     if not (source.kp or source.ki or source.kd):
-        raise NoMatchError("every term of the source is off")
+        raise NoMatchError("the source has no action, every term is off")
     if source.ki and not target.has_integral:
         raise NoMatchError(f"the source has integral action, {have} has none")
     if source.kd and not target.has_derivative:
@@ -58,9 +58,11 @@ def _chosen(target: Target) -> str:
 
 
 def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
-    """Return the numbers for which all coefficients of the feedback path agree; the target's filter must be free.
+    """Return the numbers for which all coefficients of the feedback path agree.
 
-    A series form has two solutions; the one with ``Ti >= Td`` comes first.
+    The target's filter must be free, or follow from an overall multiplier that is: with a filter time in proportion to the
+    derivative on the dial, the multiplier decides how much of the derivative stands there. A series form has two solutions; the one
+    with ``Ti >= Td`` comes first.
 
     Raises
     ------
@@ -69,7 +71,8 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     """
     n0, n1, n2, d1, d2 = law.coefficients()
     shape, filt = target.shape, target.filter
-    if not filt.free:
+    by_multiplier = target.form is Form.PARALLEL and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
+    if not filt.free and not by_multiplier:
         raise NoMatchError("the target's filter is fixed")
     wanted_d2 = d1 * d1 / 2 if shape.filter_order == 2 and shape.filter_on == "measurement" else 0.0
     if abs(d2 - wanted_d2) > _ROUNDING * max(d1 * d1, abs(d2)):
@@ -80,8 +83,17 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
         return tuple(_exact_series(n0, n1, n2, d1, filt))
     kp = _clean(n1 - n0 * d1, n1)
     kd = _clean(n2 - kp * d1, n2)
+    if not filt.free and not (kd and d1):
+        raise NoMatchError("there is no derivative with a filter to set the multiplier by")
+    if not filt.free:
+        target.multiplier = abs(filt.ratio * kd / d1)
+        return (Numbers(kp, n0, kd),)
     if target.has_proportional:
         return (Numbers(kp, n0, kd, d1),)
+    if abs(kp) > 0:
+        raise NoMatchError("the target has no proportional term")
+    if filt.ratio and kd and d1:  # the gain is free: the one that leaves the filter as delivered
+        target.idle_gain = abs(filt.ratio * kd / d1)
     return (replace(_without_proportional(n0, kd, target), Tf=d1),)
 
 
@@ -108,14 +120,16 @@ def _leads(n0: float, n1: float, n2: float) -> tuple[float, ...]:
 
 def _exact_series(n0: float, n1: float, n2: float, d1: float, filt: TargetFilter) -> Iterator[Numbers]:
     """Factor the numerator; the filter is on the derivative term or the lag of a lead-lag."""
-    for lead in _leads(n0, n1, n2):
+    leads = _leads(n0, n1, n2)
+    times = [_clean(lead if filt.lead_lag else lead - d1, lead) for lead in leads]
+    if max(times) < 0:
+        raise NoMatchError(
+            f"its filter, {d1:.6g} s, is longer than the derivative time {max(leads):.6g} s of the equivalent series form"
+        )
+    for lead, time in zip(leads, times, strict=True):
         K = n1 - n0 * lead
-        time = _clean(lead if filt.lead_lag else lead - d1, lead)
-        if time < 0:
-            raise NoMatchError(
-                f"its filter, {d1:.6g} s, is longer than the derivative time {lead:.6g} s of the equivalent series form"
-            )
-        yield Numbers(K, n0, K * time, d1)
+        if time >= 0:
+            yield Numbers(K, n0, K * time, d1)
 
 
 def _complex_zeros(n0: float, n1: float, n2: float) -> str:
@@ -267,7 +281,7 @@ def weights(law: Law, target: Target, feedback: Algorithm) -> tuple[float | None
     per_gain = a.ki / a.kp if a.kp else 0.0
     shrink = 1 - a.Tf * per_gain if a.series and a.filter_on == "term" else 1.0
     c = m2 / (a.kd * shrink) if a.kd and shrink else None
-    c_free, b_free = target.weight_is_free(Role.DERIVATIVE_WEIGHT), target.weight_is_free(Role.PROPORTIONAL_WEIGHT)
+    c_free, b_free = target.may_choose(Role.DERIVATIVE_WEIGHT), target.may_choose(Role.PROPORTIONAL_WEIGHT)
     held = (c if c is not None else 0.0) if c_free else a.c
     b = (m1 - (held * a.kd * per_gain if a.series else 0.0)) / a.kp if a.kp else None
     return _snapped(b) if b_free else None, _snapped(c) if c_free else None

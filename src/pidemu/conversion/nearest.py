@@ -52,6 +52,9 @@ def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
     sign = math.copysign(1.0, m1 or m0 or m2)
     gains = _clip((size * 1e-3, size * 1e3), _range(target, Role.GAIN))
     rates = _range(target, Role.INTEGRAL)
+    if m0 and target.has_integral and target.form is not Form.PARALLEL:  # gains that keep m0, if there are any
+        keeping = max(gains[0], abs(m0) / rates[1]), min(gains[1], abs(m0) / rates[0] if rates[0] else math.inf)
+        gains = keeping if keeping[0] < keeping[1] else gains
     times = _clip((scale * 1e-4, scale * 1e2), _range(target, Role.DERIVATIVE))
     center, width = (
         [_middle(gains), _middle(times)],

@@ -66,7 +66,8 @@ class Solver:
             return (*self._closed(match), "")
         except (NoMatchError, SettingError) as error:
             reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
-        numbers = nearest(self.law, self.target, self.factor)
+        a = self.scaled.algorithm
+        numbers = nearest(self.law, self.target, self.factor) if a.kp or a.ki or a.kd else None
         if numbers is not None:
             with suppress(SettingError):
                 return self._weighted(numbers), "constrained", reason
@@ -95,13 +96,40 @@ class Solver:
         return self.target.settings(closed.textbook(a, kd, self.target))
 
     def _closed(self, match: str | None) -> tuple[Settings, Match]:
+        own = self._own()
+        if own is not None and (own[0] == "exact" and match != "low-frequency"):
+            return own[1], "exact"
+        try:
+            return self._matches(match)
+        except (NoMatchError, SettingError):
+            if own is None:
+                raise
+            return own[1], "exact"
+
+    def _own(self) -> tuple[str, Settings] | None:
+        """Return verdict and settings for the source's own numbers, where these are an exact match of a target of its form."""
+        equation, a = self.source.equation, self.scaled.algorithm
+        gain, time = self.source.by_role(Role.GAIN), self.source.by_role(Role.DERIVATIVE)
+        if equation.form is not self.target.form:
+            return None
+        K = a.kp or (gain.canonical if gain is not None else 0.0)
+        kd = a.kp * time.canonical if a.series and a.kd and time is not None else a.kd
+        with suppress(SettingError):
+            settings = self._weighted(Numbers(K, a.ki, kd, a.Tf if self.target.filter.free else None))
+            verdict = self.certify(settings).verdict
+            return None if verdict == "approximate" else (verdict, settings)
+        return None
+
+    def _matches(self, match: str | None) -> tuple[Settings, Match]:
         why: NoMatchError | SettingError | None = None
-        if self.target.filter.free and match != "low-frequency":
+        if match != "low-frequency":
+            multiplier = self.target.multiplier
             try:
                 return self._best(closed.exact(self.scaled, self.target)), "exact"
             except (NoMatchError, SettingError) as error:
                 why = error
-                if match == "exact":
+                self.target.multiplier = multiplier
+                if match == "exact" and self.target.filter.free:
                     raise
         try:
             settings = self._low_frequency()

@@ -133,6 +133,9 @@ class Target:
         self.idle_gain = 1.0
         """Gain taken where there is no proportional term, so that the gain only scales the two times."""
         self._check_given()
+        dial = self.dial(Role.MULTIPLIER)
+        self.multiplier = self.template()[dial[0]].canonical if dial is not None else 1.0
+        """Overall multiplier of all three terms."""
         self.filter = self._find_filter()
         """The filter, whether it is free and, once a match has fixed it, its value."""
 
@@ -156,8 +159,8 @@ class Target:
         """Whether the conversion may choose a dial."""
         return name not in self.given and setting.scope == "loop"
 
-    def weight_is_free(self, role: Role) -> bool:
-        """Whether the conversion may choose a setpoint weight."""
+    def may_choose(self, role: Role) -> bool:
+        """Whether the conversion may choose the dial that sets `role`: a setpoint weight, an overall multiplier."""
         dial = self.dial(role)
         return dial is not None and self.is_free(*dial)
 
@@ -216,12 +219,12 @@ class Target:
 
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
-        scale = self._multiplier()
+        scale = self.multiplier
         engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
-        wanted = [(Role.GAIN, n.K / scale), (Role.INTEGRAL, rate), (Role.DERIVATIVE, time)]
+        wanted = [(Role.GAIN, n.K / scale), (Role.INTEGRAL, rate), (Role.DERIVATIVE, time), (Role.MULTIPLIER, scale)]
         if n.b is not None:
             wanted.append((Role.PROPORTIONAL_WEIGHT, n.b))
         if n.c is not None:
@@ -252,10 +255,6 @@ class Target:
             raise SettingError(f"{name} would have to be negative, {value:.6g} {setting.unit}: {why}")
         return next((end for end in ends if math.isclose(value, end, rel_tol=1e-12)), value)
 
-    def _multiplier(self) -> float:
-        dial = self.dial(Role.MULTIPLIER)
-        return self.template()[dial[0]].canonical if dial is not None else 1.0
-
     def _to_dial(self, name: str, setting: Setting, value: float) -> float:
         role = Role(setting.sets)
         off = off_values(setting)
@@ -271,14 +270,14 @@ class Target:
         assert f.setting is not None
         setting = self.variant.equation.settings[f.setting]
         if f.kind == "time":
-            return {f.setting: self._to_dial(f.setting, setting, Tf)}
+            return {f.setting: self._in_reach(f.setting, setting, self._to_dial(f.setting, setting, Tf))}
         if base == 0:
             return {}
         if f.kind == "ratio":
-            return {f.setting: Tf / base}
+            return {f.setting: self._in_reach(f.setting, setting, Tf / base)}
         if Tf == 0:
             raise SettingError(f"{f.setting} would have to be infinite: this target always filters its derivative")
-        return {f.setting: base / Tf}
+        return {f.setting: self._in_reach(f.setting, setting, base / Tf)}
 
     def algorithm_at(self, K: Any, Ti: Any, Td: Any) -> Algorithm:
         """Return the target's algorithm for arrays of gain, integral time [s] and derivative time [s], filter as fixed.
@@ -287,9 +286,9 @@ class Target:
         """
         f = self.filter
         base = Td / (1 + Td / Ti) if f.effective else Td * K if self.form is Form.PARALLEL and f.kind != "time" else Td
-        Tf = f.time if f.kind == "time" else f.ratio * base / (self._multiplier() if self.form is Form.PARALLEL else 1.0)
+        Tf = f.time if f.kind == "time" else f.ratio * base / (self.multiplier if self.form is Form.PARALLEL else 1.0)
         kd = K * (Td - Tf) if f.lead_lag else K * Td
-        return replace(self.shape, kp=K, ki=K / Ti, kd=kd, Tf=Tf)
+        return replace(self.shape, kp=K if self.has_proportional else 0.0, ki=K / Ti, kd=kd, Tf=Tf)
 
 
 def _placeholder(setting: Setting) -> float:

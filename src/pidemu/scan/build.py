@@ -98,11 +98,17 @@ def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, ini
     check_filters(a, h)
 
 
+def _share(a: Algorithm, h: float) -> float:
+    """Return the share of the cut-off that is taken out of the integral per scan (section 5)."""
+    implicit = a.windup == "external-reset" and a.integral_rule is Rule.BACKWARD
+    return h / (a.tracking_time + h) if implicit else h / a.tracking_time if a.tracking_time else math.inf
+
+
 def _terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initial_output: float) -> Terms:
     """Filter the measurement and compute P, D and the signal that the integral acts on (sections 2 and 4)."""
     low = b.coefficient("low", limits[0], "low output limit", "%")
     high = b.coefficient("high", limits[1], "high output limit", "%")
-    u = b.state("u", "last output", "%", min(max(initial_output, limits[0]), limits[1]))
+    u = b.state("u", "last output", "%", initial_output)
     on = b.state("on", "automatic in the last scan", "-")
     was_auto = on > 0.0
     fresh = equal(on, 0.0) if a.restarted else equal(b.state("begun", "there has been a scan", "-"), 0.0)
@@ -229,10 +235,8 @@ def _after_output(b: Builder, a: Algorithm, h: float, v: Expr, out: Expr, grown:
     """Do what is done to the integral after the output (section 5)."""
     state = Name("I")
     if a.windup in ("back-calculation", "external-reset"):
-        Tt = a.tracking_time
-        share = h / (Tt + h) if a.windup == "external-reset" and a.integral_rule is Rule.BACKWARD else h / Tt
-        back = b.coefficient("back", share, "share of the cut-off taken out of the integral per scan", "-")
-        b.let("I", state + back * (out - v), f"{a.windup}, Tt = {Tt:.6g} s (section 5)")
+        back = b.coefficient("back", _share(a, h), "share of the cut-off taken out of the integral per scan", "-")
+        b.let("I", state + back * (out - v), f"{a.windup}, Tt = {a.tracking_time:.6g} s (section 5)")
     if a.integral_rule is Rule.FORWARD and grown is not None:
         b.let("I", state + grown, "integral, after the output: forward (section 4)")
     if a.windup in ("back-calculation", "external-reset"):
