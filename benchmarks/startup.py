@@ -1,7 +1,7 @@
 """How long a whole ``pidemu convert`` takes, as a multiple of importing what it is built on.
 
-Run ``python benchmarks/startup.py`` in an environment where pidemu is installed and byte-compiled. Both processes alternate, so that a noisy
-machine disturbs both; the ratio of the medians is printed, with the spread of the ratio of neighbours.
+Run ``python benchmarks/startup.py`` in an environment where pidemu is installed and byte-compiled. Both processes alternate, so
+that a noisy machine disturbs both; the ratio of the medians is printed, with the spread of the ratio of neighbours.
 """
 
 from __future__ import annotations
@@ -30,9 +30,8 @@ def main() -> None:
     ratios = sorted(c / b for b, c in pairs)
     print(f"import numpy, pydantic, yaml   {1000 * base:7.0f} ms")
     print(f"pidemu convert                 {1000 * convert:7.0f} ms")
-    print(
-        f"ratio of medians               {convert / base:7.2f}   (quartiles {ratios[ROUNDS // 4]:.2f} to {ratios[3 * ROUNDS // 4]:.2f}; at most 2.5)"
-    )
+    low, high = ratios[ROUNDS // 4], ratios[3 * ROUNDS // 4]
+    print(f"ratio of medians               {convert / base:7.2f}   (quartiles {low:.2f} to {high:.2f}; at most 2.5)")
 
 
 if __name__ == "__main__":
