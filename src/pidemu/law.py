@@ -19,64 +19,9 @@ import numpy.typing as npt
 from pidemu.algorithm import Algorithm, check_filters
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
+from pidemu.rational import Rational, Response, add, multiply
 
 PathName = Literal["feedback", "setpoint"]
-Response = npt.NDArray[np.complex128]
-
-
-@dataclass(frozen=True, slots=True)
-class Rational:
-    """A quotient of two polynomials in one operator; coefficients ascend from the constant.
-
-    Attributes
-    ----------
-    num, den : tuple of float
-        Coefficients of numerator and denominator.
-    """
-
-    num: tuple[float, ...]
-    den: tuple[float, ...] = (1.0,)
-
-    def __add__(self, other: Rational | float) -> Rational:
-        o = _rational(other)
-        return Rational(_add(_mul(self.num, o.den), _mul(o.num, self.den)), _mul(self.den, o.den))
-
-    def __mul__(self, other: Rational | float) -> Rational:
-        o = _rational(other)
-        return Rational(_mul(self.num, o.num), _mul(self.den, o.den))
-
-    __radd__ = __add__
-    __rmul__ = __mul__
-
-    def __call__(self, x: npt.ArrayLike) -> Response:
-        """Return the value at the operator's values `x`."""
-        at = np.asarray(x, dtype=np.complex128)
-        value: Response = _horner(self.num, at) / _horner(self.den, at)
-        return value
-
-
-def _rational(x: Rational | float) -> Rational:
-    return x if isinstance(x, Rational) else Rational((float(x),))
-
-
-def _add(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
-    n = max(len(a), len(b))
-    return tuple((a[i] if i < len(a) else 0.0) + (b[i] if i < len(b) else 0.0) for i in range(n))
-
-
-def _mul(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
-    out = [0.0] * (len(a) + len(b) - 1)
-    for i, x in enumerate(a):
-        for j, y in enumerate(b):
-            out[i + j] += x * y
-    return tuple(out)
-
-
-def _horner(coefficients: Sequence[float], x: Response) -> Response:
-    value = np.zeros_like(x)
-    for c in reversed(coefficients):
-        value = value * x + c
-    return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,14 +147,14 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
 
     def differentiator(Tf: float) -> Rational:
         top, bottom = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
-        return Rational(top, _add(bottom, _mul((Tf,), top)))
+        return Rational(top, add(bottom, multiply((Tf,), top)))
 
     def lag(Tf: float, order: int) -> Rational:
         top, bottom = s_of(a.filter_rule)
         if order == 1 or not Tf:
-            return Rational(bottom, _add(bottom, _mul((Tf,), top))) if Tf else Rational((1.0,))
-        square = _mul(bottom, bottom)
-        den = _add(_add(square, _mul((Tf,), _mul(top, bottom))), _mul((Tf * Tf / 2,), _mul(top, top)))
+            return Rational(bottom, add(bottom, multiply((Tf,), top))) if Tf else Rational((1.0,))
+        square = multiply(bottom, bottom)
+        den = add(add(square, multiply((Tf,), multiply(top, bottom))), multiply((Tf * Tf / 2,), multiply(top, top)))
         return Rational(square, den)
 
     return Operators(Rational(integral[1], integral[0]), differentiator, lag)

@@ -392,7 +392,7 @@ def test_a_forward_rule_unstable_at_the_card_s_own_scan_is_refused(tmp_path: Pat
         "the filter time 0.1 s is too short for the scan interval 1 s: the forward rule is unstable; "
         "use a scan interval below 0.2 s or no filter"
     )
-    assert [f"19:3: with STRUCTURE=I-PD: {unstable}", f"19:3: with STRUCTURE=PID: {unstable}"] == headlines(faults(tmp_path, text))
+    assert [f"18:3: with STRUCTURE=I-PD: {unstable}", f"18:3: with STRUCTURE=PID: {unstable}"] == headlines(faults(tmp_path, text))
 
 
 @pytest.mark.parametrize(

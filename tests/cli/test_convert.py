@@ -14,7 +14,8 @@ from tests.cli.helpers import said, strict_json, told
 
 PROVOX = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav")
 PI = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "--to", "emerson/deltav")
-REFUSED = (*PI, "--set", "STRUCTURE=4")
+REFUSED = ("convert", "honeywell/tdc3000", "K=1", "T1=1", "T2=30", "--to", "emerson/deltav")
+HOPELESS = (*PI, "--set", "STRUCTURE=4")
 
 
 def converted(*words: str) -> Any:
@@ -138,12 +139,22 @@ def test_a_refusal_says_why_and_what_would_be_nearest() -> None:
     first, second, *rest = err.splitlines()
     assert (status, out) == (1, "")
     assert first == (
-        "error: refused: emerson/deltav cannot do what fisher/provox does: the source has integral action, "
-        "emerson/deltav (FORM=Standard, STRUCTURE=4) has none"
+        "error: refused: emerson/deltav cannot do what honeywell/tdc3000 does: RATE would have to be negative, -115.714 s: "
+        "with these filters no positive one fits"
     )
     assert second == "nearest settings, which 'pidemu convert --allow-approximate' gives:"
-    assert rest[0] == "  GAIN = 2 %/%"
+    assert [line.split(" = ")[0].strip() for line in rest[:-1]] == ["GAIN", "RESET", "RATE", "ALPHA"]
     assert rest[-1].startswith("their cost: up to ")
+
+
+def test_a_refusal_without_any_useful_settings_offers_none() -> None:
+    status, out, err = said(*HOPELESS)
+    assert (status, out) == (1, "")
+    assert err == (
+        "error: refused: emerson/deltav cannot do what fisher/provox does: the source has integral action, "
+        "emerson/deltav (FORM=Standard, STRUCTURE=4) has none; no settings of it come near\n"
+    )
+    assert strict_json(said(*HOPELESS, "--json").out)["verdict"] == "refused"
 
 
 def test_a_refusal_prints_plain_ratios_without_a_unit() -> None:
@@ -156,7 +167,7 @@ def test_a_refusal_as_json_has_the_verdict_refused_and_the_nearest_settings() ->
     assert status == 1
     assert found["verdict"] == "refused"
     assert err == f"error: refused: {found['reason']}\n"
-    assert found["to"]["settings"]["GAIN"] == {"value": 2.0, "unit": "%/%"}
+    assert found["to"]["settings"]["RATE"] == {"value": 0.0, "unit": "s"}
 
 
 def test_the_nearest_settings_are_given_where_approximation_is_allowed() -> None:

@@ -179,7 +179,7 @@ APPROXIMATE = [
     ("foxboro/pneumatic", {"PB": 100, "INT": 1, "DERIV": 0.25}, "honeywell/udc", {}, None),
     ("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0.2}, "emerson/deltav", {}, None),
     ("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.1, "FORM": "ideal"}, "fisher/provox", {}, None),
-    ("allen-bradley/plc5", {"EQUATION": "ISA", "KC": 2, "TI": 0.5, "TD": 0.1}, "bailey/fc19", {}, None),
+    ("allen-bradley/plc5", {"EQUATION": "ISA", "KC": 2, "TI": 0.5, "TD": 0.1}, "bailey/fc19", {"K": 1}, None),
 ]
 """Conversions that leave a deviation."""
 

@@ -283,7 +283,7 @@ class Card:
         >>> s["RESET"].to("s/repeat")
         15.0
         """
-        from pidemu.settings import make_settings  # settings depend on cards, not cards on settings
+        from pidemu.reading import make_settings  # settings depend on cards, not cards on settings
 
         return make_settings(self, {**(given or {}), **values})
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.law import Law, PathName, Response
+from pidemu.law import Law, PathName
 from pidemu.plain import json_safe
+from pidemu.rational import Response
 
+Floats = npt.NDArray[np.float64]
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
 
 EXACT: Final = 1e-9
@@ -181,25 +184,38 @@ def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[floa
     return (low, loop), (low, max(min(100 / Td, nyquist), loop))
 
 
-def compare(source: Response, target: Response, w: npt.NDArray[np.float64]) -> Band:
-    """Compare two responses at frequencies `w` [rad/s]."""
+def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
+    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ratio = target / source
-        both_zero = (source == 0) & (target == 0)
-        ratio[both_zero] = 1.0
+        ratio[(source == 0) & (target == 0)] = 1.0
         deviation = np.abs(ratio - 1)
-        deviation[np.isnan(deviation)] = np.inf
         gain = np.abs(20 * np.log10(np.abs(ratio)))
         phase = np.abs(np.degrees(np.angle(ratio)))
+    return np.where(np.isnan(deviation), np.inf, deviation), np.where(np.isnan(gain), np.inf, gain), np.nan_to_num(phase)
+
+
+def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Response], low: float, high: float) -> Band:
+    """Compare two responses over a band.
+
+    The largest differences are looked for on a logarithmic grid, and once more, finely, around each of those found.
+
+    Parameters
+    ----------
+    source, target : callable
+        From frequencies [rad/s] to the complex response.
+    low, high : float
+        Ends of the band [rad/s].
+    """
+    w = np.geomspace(low, high, _POINTS)
+    found = differences(source(w), target(w))
+    peaks = {int(np.argmax(x)) for x in found}
+    fine = np.concatenate([np.geomspace(w[max(k - 1, 0)], w[min(k + 1, w.size - 1)], _POINTS // 4) for k in sorted(peaks)])
+    finer = differences(source(fine), target(fine))
+    deviation, gain, phase = (np.concatenate(pair) for pair in zip(found, finer, strict=True))
     worst = int(np.argmax(deviation))
-    return Band(
-        float(w[0]),
-        float(w[-1]),
-        float(deviation[worst]),
-        float(np.nanmax(gain)),
-        float(np.nanmax(np.nan_to_num(phase))),
-        float(w[worst]),
-    )
+    at = float(np.concatenate([w, fine])[worst])
+    return Band(low, high, float(deviation[worst]), float(np.max(gain)), float(np.max(phase)), at)
 
 
 def compare_paths(
@@ -218,11 +234,11 @@ def compare_paths(
     factor : float
         What the source's gain is multiplied by for new signal ranges.
     """
-    found = []
-    for low, high in limits:
-        w = np.geomspace(low, high, _POINTS)
-        found.append(compare(factor * source.response(w, path), target.response(w, path), w))
-    return PathComparison(*found)
+
+    def scaled(w: Floats) -> Response:
+        return factor * source.response(w, path)
+
+    return PathComparison(*(compare(scaled, lambda w: target.response(w, path), low, high) for low, high in limits))
 
 
 def certify(

@@ -19,6 +19,8 @@ _GRID: Final = 25
 _ROUNDS: Final = 16
 _SHRINK: Final = 0.45
 _POINTS: Final = 40
+_USELESS: Final = 0.99
+"""Deviation from which settings are not worth offering."""
 _MARGIN: Final = 1e-9
 """Relative distance kept from a range's end, so that unit conversion does not step over it."""
 
@@ -41,7 +43,7 @@ def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
     Returns
     -------
     Numbers or None
-        ``None`` where nothing comes within a deviation of 1, that is, where doing nothing would be as near.
+        ``None`` where the deviation of all is near 1 or above, that is, where no controller at all would be as near.
     """
     (low, high), _ = bands(law, None)
     w = np.geomspace(low, high, _POINTS)
@@ -73,7 +75,7 @@ def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
             best = (float(cost[i, j]), float(K[i, 0]), float(np.broadcast_to(ki, cost.shape)[i, 0]), float(Td[0, j]))
         center = [best[1], best[3] or center[1]]
         width = [x * _SHRINK for x in width]
-    if best is None or not best[0] < 1:
+    if best is None or not best[0] < _USELESS:
         return None
     _, K_best, ki_best, Td_best = best
     return Numbers(sign * K_best, sign * ki_best, sign * K_best * Td_best)

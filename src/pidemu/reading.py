@@ -1,0 +1,175 @@
+"""Reading settings: what a user gives, as numbers or with units, checked against a card."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any, Final
+
+from pidemu.card.load import Card, Variant
+from pidemu.card.models import Form, Setting
+from pidemu.errors import SettingError, UnitError, suggest
+from pidemu.settings import RESERVED, Settings, Value, is_active, limits, off_values, spans_of
+from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
+
+_PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
+
+
+def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
+    """Read settings and options; see `Card.settings`."""
+    given = dict(given)
+    _refuse_twice(card, given)
+    pv_range, op_range = (_range(card, name, given.pop(name, None)) for name in RESERVED)
+    options = {k: v for k, v in given.items() if _known(k, card.data.options)}
+    dials = {k: v for k, v in given.items() if k not in options}
+    notes: list[str] = []
+    implied = _implied(card, options, dials, notes)
+    variant = card.variant(implied)
+    folded = {name.casefold() for name in implied}
+    defaulted = tuple(name for name in card.options if name.casefold() not in folded)
+    spans = spans_of(pv_range, op_range)
+    values: dict[str, Value] = {}
+    faults: list[str] = []
+    names = {_known(k, variant.equation.settings) or k: v for k, v in dials.items()}
+    unknown = [name for name in names if name not in variant.equation.settings]
+    faults += [_unknown(card, variant, name) for name in unknown]
+    misspelt = " ".join(faults)
+    for name, setting in variant.equation.settings.items():
+        active = is_active(variant.equation, name, setting)
+        try:
+            value = _read(name, setting, names.get(name), spans, active, variant.equation.form)
+        except (UnitError, SettingError) as error:
+            if f"did you mean '{name}'" not in misspelt:
+                faults.append(f"{card.id}: {name}: {error}")
+            continue
+        if value is not None:
+            values[name] = value
+            if value.note:
+                notes.append(f"{name}: {value.note}")
+            if value.given and not active:
+                chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
+                notes.append(f"{name} is not used with {chosen}")
+    if faults:
+        raise SettingError("\n".join(faults))
+    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted)
+
+
+def _refuse_twice(card: Card, given: Mapping[str, object]) -> None:
+    """Refuse a name given in two spellings."""
+    seen: dict[str, str] = {}
+    for name in given:
+        first = seen.setdefault(name.casefold(), name)
+        if first != name:
+            raise SettingError(f"{card.id}: {first} and {name} are the same setting; give it once")
+
+
+def _known(name: str, known: Mapping[str, Any]) -> str | None:
+    if name in known:
+        return name
+    folded = [k for k in known if k.casefold() == name.casefold()]
+    return folded[0] if len(folded) == 1 else None
+
+
+def _unknown(card: Card, variant: Variant, name: str) -> str:
+    everything = [*card.all_settings(), *card.data.options]
+    if name in everything:
+        chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
+        return f"{card.id}: {name} is not a setting with {chosen}; settings: {', '.join(variant.equation.settings)}"
+    return f"{card.id}: unknown setting '{name}'{suggest(name, everything)}; settings: {', '.join(everything)}"
+
+
+def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, object], notes: list[str]) -> dict[str, object]:
+    """Choose an option nobody gave where the dials named exist under one of its choices only."""
+    chosen = dict(options)
+    for name, option in card.data.options.items():
+        if _known(name, options) or any(k.casefold() == name.casefold() for k in options):
+            continue
+        fits = [
+            choice
+            for choice in card.options[name]
+            if all(_known(d, card.variant({**chosen, name: choice}).equation.settings) for d in dials)
+        ]
+        if fits and option.default not in fits:
+            chosen[name] = fits[0]
+            notes.append(f"{name}={fits[0]}, since {', '.join(dials)} are its settings")
+    return chosen
+
+
+def _range(card: Card, name: str, given: object) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    try:
+        if isinstance(given, str):
+            raise ValueError
+        low, high = (float(x) for x in given)  # type: ignore[attr-defined]
+    except (TypeError, ValueError, OverflowError):
+        raise SettingError(f"{card.id}: {name}: '{given}' is not a pair of numbers such as (0, 200)") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise SettingError(f"{card.id}: {name}: {low:g} to {high:g} is no range; give low, then high")
+    return low, high
+
+
+def _read(name: str, setting: Setting, given: object, spans: Spans, active: bool, form: Form) -> Value | None:
+    unit = parse_unit(setting.unit)
+    if given is None:
+        if setting.default is not None:
+            return Value(name, setting, setting.default, unit.name, spans, given=False, active=active)
+        if not active:
+            return None
+        raise SettingError(f"missing; it {_purpose(setting)}, in {unit.name}")
+    number, written, note = _number(given, setting, unit, spans, form)
+    value = Value(name, setting, number, unit.name, spans, active=active, note=note)
+    _check(value, given if written else None)
+    return value
+
+
+def _purpose(setting: Setting) -> str:
+    return f"sets the {setting.sets.replace('-', ' ')}" + (f" ({setting.about})" if setting.about else "")
+
+
+def _number(given: object, setting: Setting, unit: Unit, spans: Spans, form: Form) -> tuple[float, bool, str]:
+    """Return the dial's number, whether another unit was written, and the conversion in words."""
+    if isinstance(given, bool) or not isinstance(given, str | Real):
+        raise SettingError(f"'{given}' is not a number, nor a text such as \"20 {unit.name}\"")
+    if isinstance(given, Real):
+        try:
+            return float(given), False, ""
+        except OverflowError:
+            raise SettingError(f"{str(given)[:12]}... is too large a number") from None
+    if given.strip().casefold() == "off":
+        if not off_values(setting):
+            raise SettingError("cannot be switched off: the card states no off value")
+        return off_values(setting)[0], False, f"off is {off_values(setting)[0]:g} {unit.name}"
+    number, written = parse_quantity(given)
+    if written is None or written == unit:
+        return number, False, ""
+    role = Role(setting.sets)
+    if role is Role.INTEGRAL and form is Form.PARALLEL and written.dimension in _PER_REPEAT and unit.dimension not in _PER_REPEAT:
+        raise SettingError(
+            f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
+            f"write {number:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
+        )
+    value = convert_unit(role, number, written, unit, spans)
+    inverted = is_reciprocal(role, written) != is_reciprocal(role, unit)
+    how = f", the reciprocal, since the dial is in {unit.name}" if inverted else ""
+    return value, True, f"{given.strip()} is {value:.6g} {unit.name}{how}"
+
+
+def _check(value: Value, written: object) -> None:
+    setting, unit = value.setting, value.unit
+    unit = "" if unit == "1" else f" {unit}"
+    shown = f"{value.value:.6g}{unit}" + (f" (given as {written})" if written is not None else "")
+    if math.isnan(value.value):
+        raise SettingError("is not a number (NaN)")
+    if value.off:
+        return
+    low, high = limits(setting)
+    if not low <= value.value <= high:
+        allowed = f"{low:g} to {high:g}{unit}"
+        off = off_values(setting)
+        raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
+    if math.isinf(value.value):
+        raise SettingError(f"{shown} is infinite, and infinity is no off value here")
+    if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
+        raise SettingError(f"{shown} would be infinite action; the smallest value above zero is meant, or another unit")
