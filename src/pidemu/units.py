@@ -181,44 +181,31 @@ def parse_quantity(text: str) -> tuple[float, Unit | None]:
     return float(number), parse_unit(unit) if unit else None
 
 
-def _exact(value: float) -> Fraction:
-    return Fraction(value)
-
-
-def _finite_to_canonical(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
+def _constant(role: Role, unit: Unit, spans: Spans) -> Fraction:
+    """Return the constant c of ``canonical = c x``, or of ``canonical = c/x`` where the dial is reciprocal."""
     if role is Role.GAIN:
         match unit.dimension:
             case Dimension.PERCENT:
-                return 100 / x
+                return Fraction(100)
             case Dimension.PV_UNITS:
-                return _exact(spans.pv) / x
+                return Fraction(spans.pv)
             case Dimension.OP_PER_PV:
-                return x * spans.ratio
+                return spans.ratio
             case Dimension.PERCENT_PER_PV:
-                return x * _exact(spans.pv) / 100
+                return Fraction(spans.pv) / 100
             case _:
-                return x
-    if role is Role.INTEGRAL and unit.dimension in _INVERTED:
-        return 1 / (x * unit.factor)
-    return x * unit.factor
+                return Fraction(1)
+    return 1 / unit.factor if is_reciprocal(role, unit) else unit.factor
 
 
-def _finite_from_canonical(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
-    if role is Role.GAIN:
-        match unit.dimension:
-            case Dimension.PERCENT:
-                return 100 / x
-            case Dimension.PV_UNITS:
-                return _exact(spans.pv) / x
-            case Dimension.OP_PER_PV:
-                return x / spans.ratio
-            case Dimension.PERCENT_PER_PV:
-                return x * 100 / _exact(spans.pv)
-            case _:
-                return x
-    if role is Role.INTEGRAL and unit.dimension in _INVERTED:
-        return 1 / (x * unit.factor)
-    return x / unit.factor
+def _inward(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
+    c = _constant(role, unit, spans)
+    return c / x if is_reciprocal(role, unit) else c * x
+
+
+def _outward(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
+    c = _constant(role, unit, spans)
+    return c / x if is_reciprocal(role, unit) else x / c
 
 
 def is_reciprocal(role: Role, unit: Unit) -> bool:
@@ -301,9 +288,9 @@ def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool
         return math.copysign(0.0 if inverted else math.inf, value)
     if value == 0 and inverted:
         return math.inf
-    convert = _finite_to_canonical if inward else _finite_from_canonical
+    convert = _inward if inward else _outward
     try:
-        return float(convert(role, _exact(value), unit, spans))
+        return float(convert(role, Fraction(value), unit, spans))
     except OverflowError:
         return math.copysign(math.inf, value)
 
@@ -320,10 +307,10 @@ def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = 
         return from_canonical(role, to_canonical(role, value, old, spans), new, spans)
     check_unit(role, old)
     check_unit(role, new)
-    canonical = _finite_to_canonical(role, _exact(value), old, spans)
+    canonical = _inward(role, Fraction(value), old, spans)
     if canonical == 0 and is_reciprocal(role, new):
         return math.inf
     try:
-        return float(_finite_from_canonical(role, canonical, new, spans))
+        return float(_outward(role, canonical, new, spans))
     except OverflowError:
         return math.copysign(math.inf, value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from pidemu.cli.common import Pair, assignments, find, vendors_option
+from pidemu.cli.common import action_option, assignments, find, limits_option, vendors_option
 from pidemu.emulator import Controller
 
 
@@ -13,14 +13,8 @@ from pidemu.emulator import Controller
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--lang", type=click.Choice(["python"]), default="python", show_default=True, help="Language.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
-@click.option(
-    "--action",
-    type=click.Choice(["reverse", "direct"]),
-    default="reverse",
-    show_default=True,
-    help="Reverse: the output falls when PV rises.",
-)
-@click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
+@action_option
+@limits_option
 @vendors_option
 def command(
     card: str,

@@ -63,6 +63,16 @@ class Scan(_PairType):
         return intervals[0], intervals[-1]
 
 
+action_option = click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    default="reverse",
+    show_default=True,
+    help="Reverse: the output falls when PV rises.",
+)
+limits_option = click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
+
+
 def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, object]:
     """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from pidemu.cli.common import Pair, assignments, find, number, vendors_option
+from pidemu.cli.common import action_option, assignments, find, limits_option, number, vendors_option
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, ScanError
 from pidemu.records import Record, read_record, write_record
@@ -25,14 +25,8 @@ from pidemu.records import Record, read_record, write_record
     help="Recorded signals: columns sp, pv and, if there are, auto, manual, output.",
 )
 @click.option("--scan", type=float, metavar="H", help="Scan interval of record and controller [s]; by default the card's.")
-@click.option(
-    "--action",
-    type=click.Choice(["reverse", "direct"]),
-    default="reverse",
-    show_default=True,
-    help="Reverse: the output falls when PV rises.",
-)
-@click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
+@action_option
+@limits_option
 @click.option("--bias", type=float, default=0.0, help="Output at zero error of a positional controller without integral action.")
 @click.option(
     "--initial-output",
