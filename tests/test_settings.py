@@ -253,7 +253,7 @@ def test_an_option_and_its_choice_may_be_written_in_lower_case() -> None:
 
 
 def test_a_dial_of_another_choice_is_refused_with_the_choice_made() -> None:
-    with pytest.raises(SettingError, match="PB is not a setting with TYPE=Gain; settings: Ti, G"):
+    with pytest.raises(SettingError, match="PB is not a setting with TYPE=Gain; settings: G, Ti"):
         with_option().settings(TYPE="Gain", G=2, PB=50, Ti=10)
 
 

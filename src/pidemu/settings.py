@@ -172,8 +172,13 @@ class Settings(Mapping[str, Value]):
         return next((v for v in self.values() if v.role is role and v.active), None)
 
     def assumptions(self) -> list[Statement]:
-        """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose."""
-        return self.variant.assumptions(self.defaulted)
+        """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose.
+
+        What is assumed of the derivative does not count where it is off.
+        """
+        found = self.variant.assumptions(self.defaulted)
+        a = self.algorithm()
+        return [s for s in found if a.kd or a.Tf or not s.path.startswith("derivative")]
 
     def algorithm(self, *, own_units: bool = False) -> Algorithm:
         """Return the algorithm with its numbers.

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pidemu.settings import Settings
 
 _REPLACED_WHOLE = ("filter", "windup")
+DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
 
 
@@ -251,6 +252,8 @@ class Card:
         for option, choice in chosen.items():
             raw = overlay(raw, self.data.options[option].choices[choice])
         raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
+        if isinstance(raw.get("settings"), dict):  # dials that choices add stand in their usual place, not at the end
+            raw["settings"] = dict(sorted(raw["settings"].items(), key=_usual_place))
         return Variant(self, chosen, _equation(raw, self.document, chosen), raw)
 
     def settings(self, given: Mapping[str, object] | None = None, /, **values: object) -> Settings:
@@ -286,6 +289,11 @@ class Card:
         from pidemu.reading import make_settings  # settings depend on cards, not cards on settings
 
         return make_settings(self, {**(given or {}), **values})
+
+
+def _usual_place(dial: tuple[str, Any]) -> int:
+    role = dial[1].get("sets") if isinstance(dial[1], dict) else None
+    return DIAL_ORDER.index(role) if role in DIAL_ORDER else len(DIAL_ORDER)
 
 
 def _match(word: str, known: Mapping[str, Any]) -> str | None:
