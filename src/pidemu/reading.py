@@ -38,7 +38,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     for name, setting in variant.equation.settings.items():
         active = is_active(variant.equation, name, setting)
         try:
-            value = _read(name, setting, names.get(name), spans, active, variant.equation.form)
+            value = _read(name, setting, names.get(name), spans, active, variant.equation.form, (bool(pv_range), bool(op_range)))
         except (UnitError, SettingError) as error:
             if f"did you mean '{name}'" not in misspelt:
                 faults.append(f"{card.id}: {name}: {error}")
@@ -110,7 +110,9 @@ def _range(card: Card, name: str, given: object) -> tuple[float, float] | None:
     return low, high
 
 
-def _read(name: str, setting: Setting, given: object, spans: Spans, active: bool, form: Form) -> Value | None:
+def _read(
+    name: str, setting: Setting, given: object, spans: Spans, active: bool, form: Form, ranged: tuple[bool, bool]
+) -> Value | None:
     unit = parse_unit(setting.unit)
     if given is None:
         if setting.default is not None:
@@ -118,7 +120,7 @@ def _read(name: str, setting: Setting, given: object, spans: Spans, active: bool
         if not active:
             return None
         raise SettingError(f"missing; it {_purpose(setting)}, in {unit.name}")
-    number, written, note = _number(given, setting, unit, spans, form)
+    number, written, note = _number(given, setting, unit, spans, form, ranged)
     value = Value(name, setting, number, unit.name, spans, active=active, note=note)
     _check(value, given if written else None)
     return value
@@ -128,7 +130,9 @@ def _purpose(setting: Setting) -> str:
     return f"sets the {setting.sets.replace('-', ' ')}" + (f" ({setting.about})" if setting.about else "")
 
 
-def _number(given: object, setting: Setting, unit: Unit, spans: Spans, form: Form) -> tuple[float, bool, str]:
+def _number(
+    given: object, setting: Setting, unit: Unit, spans: Spans, form: Form, ranged: tuple[bool, bool]
+) -> tuple[float, bool, str]:
     """Return the dial's number, whether another unit was written, and the conversion in words."""
     if isinstance(given, bool) or not isinstance(given, str | Real):
         raise SettingError(f"'{given}' is not a number, nor a text such as \"20 {unit.name}\"")
@@ -150,10 +154,22 @@ def _number(given: object, setting: Setting, unit: Unit, spans: Spans, form: For
             f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
             f"write {number:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
         )
+    _need_ranges(written, unit, ranged)
     value = convert_unit(role, number, written, unit, spans)
     inverted = is_reciprocal(role, written) != is_reciprocal(role, unit)
     how = f", the reciprocal, since the dial is in {unit.name}" if inverted else ""
     return value, True, f"{given.strip()} is {value:.6g} {unit.name}{how}"
+
+
+def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:
+    """Refuse a unit whose conversion takes the signal ranges, where these are not given."""
+    needs = {Dimension.PV_UNITS: (True, False), Dimension.PERCENT_PER_PV: (True, False), Dimension.OP_PER_PV: (True, True)}
+    pv, op = needs.get(written.dimension, needs.get(unit.dimension, (False, False)))
+    missing = [name for name, needed, given in zip(RESERVED, (pv, op), ranged, strict=True) if needed and not given]
+    if missing:
+        raise SettingError(
+            f"{written.name} is {written.dimension.value}, for a dial in {unit.name}: {' and '.join(missing)} must be given"
+        )
 
 
 def _check(value: Value, written: object) -> None:

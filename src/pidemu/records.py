@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -18,12 +19,15 @@ from pidemu.errors import RecordError, suggest
 Floats = npt.NDArray[np.float64]
 
 _COLUMNS: Final = {
+    "time": ("time", "t", "timestamp"),
     "sp": ("sp", "setpoint", "r"),
     "pv": ("pv", "measurement", "y"),
     "auto": ("auto", "automatic"),
     "manual": ("manual", "man"),
     "output": ("output", "out", "op", "cv", "u"),
 }
+_UNEVEN: Final = 0.01
+"""Relative jitter of a time column that counts as none."""
 _TRUE: Final = {"1", "1.0", "true", "yes", "auto", "automatic", "a"}
 _FALSE: Final = {"0", "0.0", "false", "no", "man", "manual", "m"}
 
@@ -40,6 +44,8 @@ class Record:
         Its cells, as they stand.
     sp, pv : ndarray of float, shape (n,)
         Setpoint and measurement.
+    time : ndarray of float, shape (n,), or None
+        Time of the samples [s].
     auto, manual, output : ndarray of float, shape (n,), or None
         Automatic (1) or manual (0); the operator's output, NaN where empty; the recorded output, NaN where empty.
     """
@@ -48,6 +54,7 @@ class Record:
     rows: tuple[tuple[str, ...], ...]
     sp: Floats
     pv: Floats
+    time: Floats | None
     auto: Floats | None
     manual: Floats | None
     output: Floats | None
@@ -56,7 +63,7 @@ class Record:
 def read_record(path: str | Path) -> Record:
     """Read a CSV file with a header line; lines that start with ``#`` are comments.
 
-    Columns are found by name: ``sp``, ``pv``, ``auto``, ``manual`` (or ``man``), ``output`` (or ``out``, ``op``); others are kept
+    Columns are found by name: ``time`` (or ``t``: seconds or timestamps), ``sp``, ``pv``, ``auto``, ``manual`` (or ``man``), ``output`` (or ``out``, ``op``); others are kept
     and ignored.
 
     Parameters
@@ -93,7 +100,7 @@ def read_record(path: str | Path) -> Record:
     assert sp is not None
     assert pv is not None
     rows = tuple(tuple(row) for _, row in table[1:])
-    return Record(tuple(header), rows, sp, pv, columns["auto"], columns["manual"], columns["output"])
+    return Record(tuple(header), rows, sp, pv, columns["time"], columns["auto"], columns["manual"], columns["output"])
 
 
 def _places(path: str, line: int, header: list[str]) -> dict[str, int | None]:
@@ -118,6 +125,8 @@ def _cell(path: str, line: int, text: str, column: str, name: str) -> float:
         raise RecordError(f"{path}:{line}: column {column}: '{text}' is neither 1 (automatic) nor 0 (manual)")
     if not word and name in ("manual", "output"):
         return math.nan
+    if name == "time":
+        return _time(path, line, column, text.strip())
     if not word:
         raise RecordError(f"{path}:{line}: column {column}: empty; every sample needs a number")
     try:
@@ -129,6 +138,53 @@ def _cell(path: str, line: int, text: str, column: str, name: str) -> float:
     if not math.isfinite(value) and name in ("sp", "pv"):
         raise RecordError(f"{path}:{line}: column {column}: '{text}' is not a finite number")
     return value
+
+
+def _time(path: str, line: int, column: str, text: str) -> float:
+    """Return seconds: the cell is a number of them, or a timestamp such as 2026-11-22T08:00:05."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        return datetime.fromisoformat(text).timestamp()
+    except ValueError:
+        wanted = "a number of seconds nor a timestamp such as 2026-11-22T08:00:05"
+        raise RecordError(f"{path}:{line}: column {column}: '{text}' is neither {wanted}") from None
+
+
+def interval(record: Record, path: str | Path, given: float | None) -> float | None:
+    """Return the scan interval of a record [s]: the given one, else that of its time column, else ``None``.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    path : path
+        Its file, for messages.
+    given : float or None
+        What the user says [s].
+
+    Raises
+    ------
+    RecordError
+        The time column is uneven, or contradicts `given`.
+    """
+    if record.time is None or record.time.size < 2:
+        return given
+    steps = np.diff(record.time)
+    step = float(np.median(steps))
+    uneven = int(np.argmax(np.abs(steps - step)))
+    if not step > 0 or abs(steps[uneven] - step) > _UNEVEN * step:
+        raise RecordError(
+            f"{path}: the time column goes on by {steps[uneven]:g} s after sample {uneven} (counted from 0), elsewhere by {step:g} s; "
+            "one line per scan is needed"
+        )
+    if given is not None and abs(given - step) > _UNEVEN * step:
+        raise RecordError(
+            f"{path}: the time column has a step of {step:g} s, --scan says {given:g} s; leave --scan out, or the column"
+        )
+    return step if given is None else given
 
 
 def write_record(record: Record, column: str, values: Iterable[float], stream: TextIO) -> None:

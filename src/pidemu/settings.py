@@ -176,7 +176,17 @@ class Settings(Mapping[str, Value]):
 
         What is assumed of the derivative does not count where it is off.
         """
-        found = self.variant.assumptions(self.defaulted)
+        return self._at_work(self.variant.assumptions(self.defaulted))
+
+    def inferences(self) -> list[Statement]:
+        """Return what of the law's equation is only inferred, one statement per evidence entry."""
+        seen: dict[str, Statement] = {}
+        for s in self.variant.statements():
+            if s.is_inferred and s.makes_the_law and not s.path.startswith("settings"):
+                seen.setdefault(s.key, s)
+        return self._at_work(list(seen.values()))
+
+    def _at_work(self, found: list[Statement]) -> list[Statement]:
         a = self.algorithm()
         return [s for s in found if a.kd or a.Tf or not s.path.startswith("derivative")]
 

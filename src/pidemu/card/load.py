@@ -93,6 +93,11 @@ class Statement:
         return self.evidence is not None and self.evidence.status is Status.ASSUMED
 
     @property
+    def is_inferred(self) -> bool:
+        """Whether it follows from something documented, without being stated itself."""
+        return self.evidence is not None and self.evidence.status is Status.INFERRED
+
+    @property
     def makes_the_law(self) -> bool:
         """Whether the linear law depends on it; the rest matters scan by scan, at limits and at transfers only."""
         head, *rest = self.path.split(".")

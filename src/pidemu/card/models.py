@@ -140,8 +140,8 @@ class WindupGate(Model):
     """Integration stops at a limit."""
 
     scheme: Literal["freeze", "conditional"] = Field(
-        description="`freeze`: no integration while the last output is at a limit. `conditional`: no integration while the "
-        "output is beyond a limit and the increment would push it further."
+        description="`freeze`: no integration that pushes further while the last output is at a limit. `conditional`: no "
+        "integration while the output is beyond a limit and the increment would push it further."
     )
 
 

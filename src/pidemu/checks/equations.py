@@ -162,6 +162,9 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
     if scheme == "external-reset" and equation.integral.rule == "trapezoidal":
         yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
+    if scheme == "external-reset" and equation.integral.on != "none" and equation.proportional.on != "error":
+        message = "external-reset needs P on the error: positive feedback of another P settles beyond the limit"
+        yield document.problem(home, message, at_key=True)
     if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
         place = variant.home(("proportional", "accumulated"))
         yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)

@@ -114,7 +114,7 @@ def command(
     if as_json:
         print_json(conversion.to_dict())
     else:
-        _print(conversion)
+        _print(conversion, round_dials)
 
 
 def _refused(error: ConversionRefusedError, source: Settings, goal: Card, as_json: bool) -> None:
@@ -133,17 +133,22 @@ def _refused(error: ConversionRefusedError, source: Settings, goal: Card, as_jso
     click.echo(f"their cost: up to {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band", err=True)
 
 
-def _print(c: Conversion) -> None:
+def _print(c: Conversion, round_dials: bool) -> None:
     heading(f"{c.source.card.id}  ->  {c.settings.card.id}")
     _side("From", c.source)
     _target(c)
     heading("\nVerdict")
-    click.echo(f"  {_VERDICTS[c.verdict]}")
+    cert = c.certificate
+    if c.verdict == "approximate" and cert.feedback.is_exact and cert.setpoint.is_exact:
+        click.echo("  approximate at these scan intervals: the continuous laws are the same, scan intervals or rules differ")
+    else:
+        click.echo(f"  {_VERDICTS[c.verdict]}")
     _figures(c.certificate)
-    _rounding(c.certificate)
+    _rounding(c, round_dials)
     _textbook(c)
     _list("Watch for", c.warnings)
     _list("Read as", (*c.source.notes, *c.settings.notes))
+    _list("These settings rest on what is inferred, not stated", c.inferences)
     _list("These settings rest on what nobody says", c.law_assumptions)
     others = len(c.assumptions) - len(c.law_assumptions)
     if others:
@@ -205,6 +210,13 @@ def _figures(c: Certificate) -> None:
             *_rows("setpoint, at the scans", c.setpoint_at_scan),
         ]
     table(["path", "band", "rad/s", "deviation", "gain", "phase"], rows, right=(3, 4, 5))
+    if c.setpoint_kick_at_scan is not None:
+        first = c.setpoint_kick_at_scan
+        click.echo(
+            "  setpoint kick, output step in the first scan: "
+            f"{number(first.source)} on the source, {number(first.target)} on the target"
+        )
+        return
     kick = c.setpoint_kick
     click.echo(
         "  setpoint kick (output step per setpoint step, at once): "
@@ -234,7 +246,11 @@ def _deg(band: Band) -> str:
     return f"{band.phase_deg:.1f} deg"
 
 
-def _rounding(c: Certificate) -> None:
+def _rounding(conversion: Conversion, asked: bool) -> None:
+    c = conversion.certificate
+    unknown = [n for n, v in conversion.settings.items() if v.active and v.setting.resolution is None]
+    if asked and unknown:
+        click.echo(f"  not rounded, since the card states no resolution: {', '.join(unknown)}")
     if not c.dials:
         return
     heading("\nRounded to the dials' resolution")

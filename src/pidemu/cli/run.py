@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
 import numpy as np
 
 from pidemu.cli.common import action_option, assignments, find, limits_option, number, vendors_option
-from pidemu.emulator import Controller
+from pidemu.emulator import Controller, Floats
 from pidemu.errors import RecordError, ScanError
-from pidemu.records import Record, read_record, write_record
+from pidemu.records import Record, interval, read_record, write_record
 
 
 @click.command("run", short_help="Run a card on recorded signals.")
@@ -56,29 +57,52 @@ def command(
 ) -> None:
     """Run CARD with the settings NAME=VALUE on a record, one scan per line, and write the record with the column 'emulated'.
 
-    Where the file has a recorded output, the largest difference is stated.
+    Where the file has a recorded output, the largest difference is stated. Without --scan the interval is that of a time column.
     """
     settings = find(card, vendors).settings(assignments(values))
     record = read_record(file)
+    step = interval(record, file, scan)
     start = _initial(record) if initial_output is None else initial_output
-    controller = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits, bias=bias, initial_output=start)
+    controller = Controller(settings, step, "direct" if action == "direct" else "reverse", limits, bias=bias, initial_output=start)
+    manual = record.output if record.manual is None else record.manual
     try:
-        emulated = controller.run(record.sp, record.pv, record.auto, record.manual)
+        emulated = controller.run(record.sp, record.pv, record.auto, manual)
     except ScanError as error:
         raise RecordError(f"{file}: {error}") from None
-    if target is None:
-        write_record(record, "emulated", emulated, sys.stdout)
-    else:
-        try:
-            with Path(target).open("w", encoding="utf-8", newline="") as stream:
-                write_record(record, "emulated", emulated, stream)
-        except OSError as error:
-            raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
-    for note in settings.notes:
+    _write(record, emulated, target)
+    for note in (*settings.notes, *_notes(record, controller, step, bias, limits or settings.equation.output.limits)):
         click.echo(f"note: {note}", err=True)
     click.echo(f"{len(emulated)} scans of {number(controller.interval)} s, {action} acting", err=True)
     if record.output is not None:
         click.echo(_difference(record, emulated), err=True)
+
+
+def _write(record: Record, emulated: Floats, target: str | None) -> None:
+    if target is None:
+        write_record(record, "emulated", emulated, sys.stdout)
+        return
+    try:
+        with Path(target).open("w", encoding="utf-8", newline="") as stream:
+            write_record(record, "emulated", emulated, stream)
+    except OSError as error:
+        raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
+
+
+def _notes(record: Record, controller: Controller, step: float | None, bias: float, limits: tuple[float, float]) -> Iterator[str]:
+    """Yield what was taken for granted."""
+    if step is None:
+        yield f"the scan interval is the card's default, {number(controller.interval)} s: the record has no time column, and --scan is not given"
+    by_hand = np.zeros(record.sp.size, dtype=bool) if record.auto is None else record.auto == 0
+    manual = record.output if record.manual is None else record.manual
+    if record.manual is None and by_hand.any() and manual is not None:
+        yield "in manual the recorded output is taken for the operator's: the record has no column 'manual'"
+    if manual is not None:
+        outside = int(np.count_nonzero(by_hand & ((manual < limits[0]) | (manual > limits[1]))))
+        if outside:
+            yield f"in {outside} samples the manual output is outside the output limits; it is taken as it is"
+    a = controller.settings.algorithm()
+    if not (a.ki or a.velocity or a.load_output or bias):
+        yield "there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"
 
 
 def _initial(record: Record) -> float:
@@ -88,7 +112,7 @@ def _initial(record: Record) -> float:
     return 0.0
 
 
-def _difference(record: Record, emulated: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+def _difference(record: Record, emulated: Floats) -> str:
     assert record.output is not None
     difference = np.abs(emulated - record.output)
     if np.all(np.isnan(difference)):

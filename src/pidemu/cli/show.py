@@ -58,7 +58,10 @@ def _facts(variant: Variant) -> None:
     q = variant.equation
     words = q.action.names
     heading("\nScan by scan")
-    start = {"bumpless": "bumpless", "load-output": "the integral is loaded with the output, the terms come on top"}
+    start = {
+        "bumpless": "bumpless, where there is integral action",
+        "load-output": "the integral is loaded with the output, the terms come on top",
+    }
     rows = [
         ["form", q.form.value],
         ["implementation", q.implementation],

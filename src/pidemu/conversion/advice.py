@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from pidemu.settings import Settings
+from pidemu.units import Role
 
 if TYPE_CHECKING:
     from pidemu.conversion.convert import Conversion
@@ -26,7 +27,10 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     if c.refusal:
         yield f"these are only the nearest settings: {c.refusal}"
     yield from _ranges(c)
+    if c.better is not None:
+        yield f"other options of the target would do better: {c.better}"
     yield from _setpoint(c)
+    yield from _multiplier(c)
     yield from _noise(c)
     yield from _without_integral(c.source, c.settings)
     yield from _nonlinear(c.source, c.settings)
@@ -35,36 +39,55 @@ def warnings_for(c: Conversion) -> Iterator[str]:
 
 
 def _ranges(c: Conversion) -> Iterator[str]:
-    if c.factor != 1:
-        yield f"the signal ranges change: the percent gain is multiplied by {c.factor:.6g} for the same effect in engineering units"
+    if abs(c.factor) != 1:
+        yield (
+            f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
+            "engineering units"
+        )
+    if c.factor < 0:
+        direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
+        yield (
+            f"the source's gains are negative: these are positive, so set the action to '{direct}' where the source was reverse "
+            f"acting, to '{reverse}' where it was direct acting"
+        )
     for s in (c.source, c.settings):
         if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
             yield (
-                f"{s.card.id} computes in engineering units, and no ranges were given: measurement and output spans are taken as "
-                "100; give pv_range and op_range"
+                f"{s.card.id} computes in engineering units, and not all ranges were given: spans not given are taken as 100; "
+                "give the ranges of measurement and output"
             )
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:
-    kick = c.certificate.setpoint_kick
+    kick = c.certificate.setpoint_kick_at_scan or c.certificate.setpoint_kick
     if c.certificate.setpoint.is_exact or (c.verdict == "approximate" and _alike(kick.source, kick.target)):
         return
-    if math.isinf(kick.source) or math.isinf(kick.target):
-        who = c.source.card.id if math.isinf(kick.source) else c.settings.card.id
-        other = kick.target if math.isinf(kick.source) else kick.source
-        if not (math.isinf(kick.source) and math.isinf(kick.target)):
-            yield (
-                f"a setpoint step spikes the output of {who} for one scan (unfiltered derivative on the error), the other "
-                f"moves by {other:.4g} % per % at once"
-            )
-            return
+    if math.isinf(kick.source) and math.isinf(kick.target):
         yield "the response to setpoint changes differs"
+    elif math.isinf(kick.source) or math.isinf(kick.target):
+        who, other = (c.source, kick.target) if math.isinf(kick.source) else (c.settings, kick.source)
+        yield (
+            f"a setpoint step spikes the output of {who.card.id} for one scan (unfiltered derivative on the error), the other "
+            f"{_jumps(other)}"
+        )
     elif _alike(kick.source, kick.target):
         yield "the response to setpoint changes differs after the first moment"
     else:
+        ratio = f" ({kick.ratio:.3g} times)" if 0 < kick.ratio < math.inf else ""
+        yield f"setpoint steps: the output {_jumps(kick.target)}, on the source it {_jumps(kick.source)}{ratio}"
+
+
+def _jumps(kick: float) -> str:
+    return f"jumps by {kick:.4g} % per % at once" if kick else "does not jump"
+
+
+def _multiplier(c: Conversion) -> Iterator[str]:
+    value = c.settings.by_role(Role.MULTIPLIER)
+    if value is not None and value.setting.default is not None and value.value != value.setting.default and c.match == "exact":
+        usual = value.setting.default
         yield (
-            f"setpoint steps: the output jumps by {kick.target:.4g} % per % at once, on the source by {kick.source:.4g}"
-            + (f" ({kick.ratio:.3g} times)" if 0 < kick.ratio < math.inf else "")
+            f"{value.name} = {value.value:.4g} makes the filter time agree, which goes with the derivative on the dial; "
+            f"'--set {value.name}={usual:g}' keeps it at {usual:g}, with a filter that differs"
         )
 
 
@@ -103,7 +126,8 @@ def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
             f"at an output limit the integral behaves differently: {source.card.id} {old.integral.windup.scheme}, "
             f"{target.card.id} {new.integral.windup.scheme}"
         )
-    if old.transfer.start != new.transfer.start:
+    a = source.algorithm()
+    if old.transfer.start != new.transfer.start and (a.kp or a.kd):
         bumps = target if new.transfer.start == "load-output" else source
         yield (
             f"transfer to automatic: {bumps.card.id} loads the output into the integral and bumps by its other terms, "

@@ -120,6 +120,8 @@ class Certificate:
         The discrete laws at the two scan intervals, where these were given.
     setpoint_kick : Kick
         The setpoint kicks of the continuous laws.
+    setpoint_kick_at_scan : Kick or None
+        What the output moves by in the first scan, at the two scan intervals.
     time_scale : float
         The source's effective integral time, which places the loop band [s].
     dials : tuple of Rounded
@@ -133,6 +135,7 @@ class Certificate:
     feedback_at_scan: PathComparison | None
     setpoint_at_scan: PathComparison | None
     setpoint_kick: Kick
+    setpoint_kick_at_scan: Kick | None
     time_scale: float
     dials: tuple[Rounded, ...] = ()
     feedback_before_rounding: PathComparison | None = None
@@ -149,7 +152,10 @@ class Certificate:
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""
         plain: dict[str, Any] = json_safe(asdict(self))
-        plain["setpoint_kick"]["ratio"] = json_safe(self.setpoint_kick.ratio)
+        for name in ("setpoint_kick", "setpoint_kick_at_scan"):
+            kick: Kick | None = getattr(self, name)
+            if kick is not None:
+                plain[name]["ratio"] = json_safe(kick.ratio)
         return plain
 
 
@@ -267,6 +273,7 @@ def certify(
         feedback_at_scan=discrete[0],
         setpoint_at_scan=discrete[1],
         setpoint_kick=Kick(factor * source.kick(), target.kick()),
+        setpoint_kick_at_scan=Kick(factor * at_scan[0].kick(), at_scan[1].kick()) if at_scan else None,
         time_scale=time_scale(source),
     )
 

@@ -9,13 +9,14 @@ from typing import Any, Final
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion.advice import warnings_for
+from pidemu.conversion.alternatives import better_options
 from pidemu.conversion.certificate import Certificate, Rounded, Verdict
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.solve import Match, Solver
 from pidemu.conversion.target import Target
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
 from pidemu.plain import json_safe
-from pidemu.settings import Settings
+from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
 MATCHES: Final = ("exact", "low-frequency", "textbook")
@@ -59,8 +60,10 @@ class Conversion:
         What the target does differently, in words.
     refusal : str
         Why the target refused, where these are only the nearest settings.
+    better : str or None
+        Which other options of the target would give a better verdict.
     factor : float
-        What the source's gain was multiplied by for new signal ranges.
+        What the source's gain was multiplied by for new signal ranges; negative where the action changes.
     scan : tuple of float or None
         Scan intervals of source and target [s].
     """
@@ -72,6 +75,7 @@ class Conversion:
     textbook: Textbook
     warnings: tuple[str, ...]
     refusal: str = ""
+    better: str | None = None
     factor: float = 1.0
     scan: tuple[float, float] | None = None
 
@@ -84,12 +88,20 @@ class Conversion:
     def assumptions(self) -> tuple[str, ...]:
         """What the result rests on without anybody having said so; what makes the law first."""
         found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
-        return tuple(text for a, text in found if a.makes_the_law) + tuple(text for a, text in found if not a.makes_the_law)
+        law = [text for a, text in found if a.makes_the_law]
+        return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
 
     @property
     def law_assumptions(self) -> tuple[str, ...]:
         """Those of `assumptions` that the figures of the continuous law rest on."""
-        return tuple(f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law)
+        found = [f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def inferences(self) -> tuple[str, ...]:
+        """What of the two equations is inferred from something documented, not itself stated."""
+        found = [f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.inferences()]
+        return tuple(dict.fromkeys(found))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json``."""
@@ -109,6 +121,7 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
+            "inferences": list(self.inferences),
         }
         safe: dict[str, Any] = json_safe(plain)
         return safe
@@ -184,16 +197,38 @@ def convert(
     card = load_card(target) if isinstance(target, str) else target
     factor = _rescaling(source, pv_range, op_range)
     scans = (float(scan), float(scan)) if isinstance(scan, int | float) else scan
+    same = source.card.id == card.id
+    chosen = {**(source.options if same else {}), **_named_as(card, options or {})}
     fixed = {**_shared(source, card), **(given or {})}
-    goal = Target(card, options or {}, fixed, pv_range or source.pv_range, op_range or source.op_range)
-    solver = Solver(source, goal, factor, scans)
-    settings, how, refusal = solver.solve(match)
+
+    def solver(named: Mapping[str, object]) -> Solver:
+        goal = Target(card, named, fixed, pv_range or source.pv_range, op_range or source.op_range)
+        return Solver(source, goal, -factor if _is_negative(source, goal) else factor, scans)
+
+    work = solver(chosen)
+    settings, how, refusal = work.solve(match)
+    present = None if settings is None or refusal else work.certify(settings)
+    better = better_options(card, chosen, present, solver) if match in (None, "exact") else None
+    if refusal and better is not None:
+        refusal = f"{refusal}; other options would do: {better}"
     if settings is None:
         raise ConversionRefusedError(refusal)
-    conversion = _conversion(solver, settings, how, refusal, round_dials=round_dials)
+    conversion = _conversion(work, settings, how, refusal, None if refusal else better, round_dials=round_dials)
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)
     return conversion
+
+
+def _named_as(card: Card, options: Mapping[str, object]) -> dict[str, object]:
+    """Return options under the card's own spelling of their names."""
+    names = {o.casefold(): o for o in card.options}
+    return {names.get(o.casefold(), o): choice for o, choice in options.items()}
+
+
+def _is_negative(source: Settings, target: Target) -> bool:
+    """Whether the source has negative gains only, and the target no place for them: then the action changes instead."""
+    a, gain = source.algorithm(), target.dial(Role.GAIN)
+    return max(a.kp, a.ki, a.kd) <= 0 > min(a.kp, a.ki, a.kd) and gain is not None and limits(gain[1])[0] >= 0
 
 
 def _shared(source: Settings, target: Card) -> dict[str, object]:
@@ -203,7 +238,9 @@ def _shared(source: Settings, target: Card) -> dict[str, object]:
     return {n: v.value for n, v in source.items() if v.active and (v.role is Role.MULTIPLIER or v.setting.scope == "module")}
 
 
-def _conversion(solver: Solver, settings: Settings, how: Match, refusal: str, *, round_dials: bool) -> Conversion:
+def _conversion(
+    solver: Solver, settings: Settings, how: Match, refusal: str, better: str | None, *, round_dials: bool
+) -> Conversion:
     """Certify, round if asked, and say what differs."""
     certificate = solver.certify(settings)
     if round_dials:
@@ -216,7 +253,7 @@ def _conversion(solver: Solver, settings: Settings, how: Match, refusal: str, *,
         textbook = Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
         textbook = Textbook(None, None, str(error))
-    conversion = Conversion(solver.source, settings, how, certificate, textbook, (), refusal, solver.factor, solver.scans)
+    conversion = Conversion(solver.source, settings, how, certificate, textbook, (), refusal, better, solver.factor, solver.scans)
     return replace(conversion, warnings=tuple(warnings_for(conversion)))
 
 

@@ -86,15 +86,14 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     if not filt.free and not (kd and d1):
         raise NoMatchError("there is no derivative with a filter to set the multiplier by")
     if not filt.free:
-        target.multiplier = abs(filt.ratio * kd / d1)
-        return (Numbers(kp, n0, kd),)
+        return (Numbers(kp, n0, kd, multiplier=abs(filt.ratio * kd / d1)),)
     if target.has_proportional:
         return (Numbers(kp, n0, kd, d1),)
     if abs(kp) > 0:
         raise NoMatchError("the target has no proportional term")
-    if filt.ratio and kd and d1:  # the gain is free: the one that leaves the filter as delivered
-        target.idle_gain = abs(filt.ratio * kd / d1)
-    return (replace(_without_proportional(n0, kd, target), Tf=d1),)
+    # the gain is free: with a filter it is the one that leaves the filter as delivered
+    gain = abs(filt.ratio * kd / d1) if filt.ratio and kd and d1 else target.idle_gain
+    return (replace(_without_proportional(n0, kd, target, gain), Tf=d1),)
 
 
 def _clean(difference: float, scale: float) -> float:
@@ -173,7 +172,7 @@ def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers
     m0, m1, m2 = law.moments()
     m2 = _clean(m2, abs(m1 * m1 / m0) if m0 else abs(m2))
     if not target.has_proportional:
-        return (_without_proportional(m0, m2, target),)
+        return (_without_proportional(m0, m2, target, target.idle_gain),)
     if not target.has_derivative:
         return (Numbers(m1, m0, 0.0),)
     if target.shape.filter_on != "term" and filt.kind != "none":
@@ -204,10 +203,10 @@ def _series_roots(m0: float, m1: float, m2: float, filt: TargetFilter) -> Iterat
             yield Numbers(K, m0, K * (D / shrink + (tau if filt.lead_lag and D else 0.0)))
 
 
-def _without_proportional(m0: float, m2: float, target: Target) -> Numbers:
+def _without_proportional(m0: float, m2: float, target: Target, gain: float) -> Numbers:
     if target.form is Form.PARALLEL:
         return Numbers(0.0, m0, m2)
-    return Numbers(math.copysign(target.idle_gain, m0 or m2), m0, m2)
+    return Numbers(math.copysign(gain, m0 or m2), m0, m2)
 
 
 def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: TargetFilter) -> Iterator[Numbers]:
@@ -252,7 +251,7 @@ def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
     if source.series and kd:
         kp = source.kp * (1 + (kd / source.kp) * (ki / source.kp))
     if not target.has_proportional:
-        return _without_proportional(ki, kd, target)
+        return _without_proportional(ki, kd, target, target.idle_gain)
     if target.form is not Form.SERIES or not kd:
         return Numbers(kp, ki, kd)
     if kp * kp < 4 * ki * kd * (1 - _ROUNDING):

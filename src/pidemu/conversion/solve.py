@@ -63,11 +63,12 @@ class Solver:
             closed.check_terms(self.scaled.algorithm, self.target)
             if match == "textbook":
                 return self.textbook(), "textbook", ""
-            return (*self._closed(match), "")
+            return (*self.closed(match), "")
         except (NoMatchError, SettingError) as error:
             reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
         a = self.scaled.algorithm
-        numbers = nearest(self.law, self.target, self.factor) if a.kp or a.ki or a.kd else None
+        idle = not a.kp and self.target.has_proportional  # nothing practicable imitates a missing proportional term
+        numbers = None if idle else nearest(self.law, self.target, self.factor)
         if numbers is not None:
             with suppress(SettingError):
                 return self._weighted(numbers), "constrained", reason
@@ -95,7 +96,14 @@ class Solver:
             kd = a.kp * time.canonical  # the dial's own time, not the strength left by a lead-lag
         return self.target.settings(closed.textbook(a, kd, self.target))
 
-    def _closed(self, match: str | None) -> tuple[Settings, Match]:
+    def closed(self, match: str | None) -> tuple[Settings, Match]:
+        """Return the target's settings by a closed form, and which.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            There is none, or it leaves the target's ranges.
+        """
         own = self._own()
         if own is not None and (own[0] == "exact" and match != "low-frequency"):
             return own[1], "exact"
@@ -123,12 +131,10 @@ class Solver:
     def _matches(self, match: str | None) -> tuple[Settings, Match]:
         why: NoMatchError | SettingError | None = None
         if match != "low-frequency":
-            multiplier = self.target.multiplier
             try:
                 return self._best(closed.exact(self.scaled, self.target)), "exact"
             except (NoMatchError, SettingError) as error:
                 why = error
-                self.target.multiplier = multiplier
                 if match == "exact" and self.target.filter.free:
                     raise
         try:

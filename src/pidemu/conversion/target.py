@@ -34,6 +34,8 @@ class Numbers:
         Filter time [s], where the target's filter is free; ``None``: as the target fixes it.
     b, c : float or None
         Setpoint weights, where the target's are free.
+    multiplier : float or None
+        Overall multiplier, where the conversion chooses one; ``None``: as it is.
     """
 
     K: float
@@ -42,6 +44,7 @@ class Numbers:
     Tf: float | None = None
     b: float | None = None
     c: float | None = None
+    multiplier: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +222,7 @@ class Target:
 
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
-        scale = self.multiplier
+        scale = self.multiplier if n.multiplier is None else n.multiplier
         engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain

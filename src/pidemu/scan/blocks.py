@@ -215,9 +215,9 @@ def saturated(v: Expr, low: Expr, high: Expr, grows: Expr) -> Expr:
     return ((v > high) & (grows > 0.0)) | ((v < low) & (grows < 0.0))
 
 
-def at_limit(u: Expr, low: Expr, high: Expr) -> Expr:
-    """Return whether an output stands at a limit (section 5, freeze)."""
-    return (u >= high) | (u <= low)
+def held_at_limit(u: Expr, low: Expr, high: Expr, grows: Expr) -> Expr:
+    """Return whether the last output stands at a limit and the integral's increment pushes it further (section 5, freeze)."""
+    return ((u >= high) & (grows > 0.0)) | ((u <= low) & (grows < 0.0))
 
 
 def held(manual: Expr, u: Expr) -> Expr:

@@ -205,8 +205,10 @@ def _gated(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr
         return grown
     grown = b.let("dI", grown, "increment of the integral")
     if a.windup == "freeze":
-        stop = blocks.at_limit(t.u, t.low, t.high)
-        return b.let("dI", select(stop, 0.0, grown), "freeze: none while the last output is at a limit (section 5)")
+        stop = blocks.held_at_limit(t.u, t.low, t.high, grown)
+        return b.let(
+            "dI", select(stop, 0.0, grown), "freeze: none that pushes further while the last output is at a limit (section 5)"
+        )
     ahead = [P, state, None if a.integral_rule is Rule.FORWARD else grown, t.D]
     v0 = b.let("v0", _sum(ahead), "sum with this increment")
     stop = blocks.saturated(v0, t.low, t.high, grown)
