@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pidemu.algorithm import Algorithm, Place, Scheme
+from pidemu.algorithm import Algorithm, Place
 from pidemu.card.models import Filter, Form, WindupBackCalculation
-from pidemu.errors import SettingError
+from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
 from pidemu.units import Role, Spans, parse_unit, to_canonical
 
@@ -44,15 +44,18 @@ def algorithm_of(settings: Settings, *, own_units: bool = False) -> Algorithm:
     else:
         kp = gain * scale
         ki, kd = kp * rate, kp * time
-    Tf, place, order = _filter(settings, equation.derivative.filter, rate, time)
-    if equation.derivative.filter is not None and equation.derivative.filter.applies_to == "lead-lag":
+    filt = equation.derivative.filter
+    if filt is not None and equation.derivative.on == "none" and filt.applies_to in ("term", "lead-lag"):
+        filt = None  # it filters what is not there
+    Tf, place, order = _filter(settings, filt, rate, time)
+    if filt is not None and filt.applies_to == "lead-lag":
         kd -= kp * Tf
     if equation.proportional.on == "none":
         kp = 0.0
     if equation.form is Form.SERIES and kd and not kp:
-        chosen = ", ".join(f"{o}={c}" for o, c in settings.options.items())
-        raise SettingError(
-            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; change {chosen}"
+        raise UndefinedError(
+            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; "
+            f"change {settings.variant.choice_text}"
         )
     windup = equation.integral.windup
     return Algorithm(
@@ -69,16 +72,12 @@ def algorithm_of(settings: Settings, *, own_units: bool = False) -> Algorithm:
         integral_rule=equation.integral.rule,
         derivative_rule=equation.derivative.rule,
         filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
-        windup=_scheme(windup.scheme),
+        windup=windup.scheme,
         tracking_time=_tracking(settings, rate, time, kp, ki, kd) if ki else 0.0,
         accumulated=equation.proportional.accumulated,
         load_output=equation.transfer.start == "load-output",
         restarted=equation.transfer.derivative == "restarted",
     )
-
-
-def _scheme(scheme: Scheme) -> Scheme:
-    return scheme
 
 
 def _weight(settings: Settings, on: str, weight: str | float | None) -> float:

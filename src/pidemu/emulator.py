@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -26,6 +27,14 @@ def default_scan(settings: Settings) -> float:
     """Return the card's scan interval [s]."""
     number, unit = parse_quantity(settings.equation.scan.default)
     return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
+
+
+def _pair(limits: Sequence[float]) -> tuple[float, float]:
+    try:
+        low, high = (float(x) for x in limits)
+    except (TypeError, ValueError):
+        raise ScanError(f"output limits {limits!r} are no pair of numbers such as (0, 100)") from None
+    return low, high
 
 
 class Controller:
@@ -91,7 +100,7 @@ class Controller:
             settings.algorithm(own_units=True),
             self.interval,
             action=action,
-            limits=output_limits or settings.equation.output.limits,
+            limits=_pair(settings.equation.output.limits if output_limits is None else output_limits),
             bias=bias,
             initial_output=initial_output,
             title=f"{settings.summary}; scan {self.interval:g} s, {action} acting",
@@ -185,6 +194,8 @@ class Controller:
         bad = np.flatnonzero(~np.isfinite(signals[0]) | ~np.isfinite(signals[1]))
         if bad.size:
             raise ScanError(f"setpoint or measurement is not a finite number in sample {bad[0]} (counted from 0)")
+        if np.isnan(signals[2]).any():
+            raise ScanError(f"the mode is not a number in sample {np.flatnonzero(np.isnan(signals[2]))[0]} (counted from 0)")
         if np.isinf(signals[3]).any():
             raise ScanError(f"the manual output is infinite in sample {np.flatnonzero(np.isinf(signals[3]))[0]} (counted from 0)")
         out = np.empty(signals[0].size)

@@ -7,6 +7,7 @@
     │   └── CardNotFoundError
     ├── UnitError            a value or unit cannot be read or does not fit the dial
     ├── SettingError         a setting or option of a card is unknown, missing or out of range
+    │   └── UndefinedError   a combination of options that makes no controller
     ├── ScanError            an algorithm cannot be run at this scan interval or with these limits
     ├── RecordError          a recorded signal file cannot be used
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
@@ -97,6 +98,10 @@ class UnitError(PidemuError):
 
 class SettingError(PidemuError):
     """A setting or an option is unknown, missing, out of range or not a number."""
+
+
+class UndefinedError(SettingError):
+    """A combination of options makes no controller."""
 
 
 class ScanError(PidemuError):

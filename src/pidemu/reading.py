@@ -48,8 +48,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
             if value.note:
                 notes.append(f"{name}: {value.note}")
             if value.given and not active:
-                chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
-                notes.append(f"{name} is not used with {chosen}")
+                notes.append(f"{name} is not used with {variant.choice_text}")
     if faults:
         raise SettingError("\n".join(faults))
     return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted)
@@ -74,8 +73,7 @@ def _known(name: str, known: Mapping[str, Any]) -> str | None:
 def _unknown(card: Card, variant: Variant, name: str) -> str:
     everything = [*card.all_settings(), *card.data.options]
     if name in everything:
-        chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
-        return f"{card.id}: {name} is not a setting with {chosen}; settings: {', '.join(variant.equation.settings)}"
+        return f"{card.id}: {name} is not a setting with {variant.choice_text}; settings: {', '.join(variant.equation.settings)}"
     return f"{card.id}: unknown setting '{name}'{suggest(name, everything)}; settings: {', '.join(everything)}"
 
 
@@ -90,6 +88,8 @@ def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, obje
             for choice in card.options[name]
             if all(_known(d, card.variant({**chosen, name: choice}).equation.settings) for d in dials)
         ]
+        if len(fits) > 1 and option.default not in fits:
+            raise SettingError(f"{card.id}: {', '.join(dials)} go with {name}={' or '.join(fits)}; say which")
         if fits and option.default not in fits:
             chosen[name] = fits[0]
             notes.append(f"{name}={fits[0]}, since {', '.join(dials)} are its settings")

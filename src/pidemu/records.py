@@ -63,8 +63,8 @@ class Record:
 def read_record(path: str | Path) -> Record:
     """Read a CSV file with a header line; lines that start with ``#`` are comments.
 
-    Columns are found by name: ``time`` (or ``t``: seconds or timestamps), ``sp``, ``pv``, ``auto``, ``manual`` (or ``man``), ``output`` (or ``out``, ``op``); others are kept
-    and ignored.
+    Columns are found by name: ``sp``, ``pv``, ``time`` (or ``t``: seconds or timestamps), ``auto``, ``manual`` (or ``man``),
+    ``output`` (or ``out``, ``op``); others are kept and ignored.
 
     Parameters
     ----------
@@ -177,8 +177,8 @@ def interval(record: Record, path: str | Path, given: float | None) -> float | N
     uneven = int(np.argmax(np.abs(steps - step)))
     if not step > 0 or abs(steps[uneven] - step) > _UNEVEN * step:
         raise RecordError(
-            f"{path}: the time column goes on by {steps[uneven]:g} s after sample {uneven} (counted from 0), elsewhere by {step:g} s; "
-            "one line per scan is needed"
+            f"{path}: the time column goes on by {steps[uneven]:g} s after sample {uneven} (counted from 0), elsewhere by "
+            f"{step:g} s; one line per scan is needed"
         )
     if given is not None and abs(given - step) > _UNEVEN * step:
         raise RecordError(

@@ -153,9 +153,9 @@ class Settings(Mapping[str, Value]):
         return self.variant.card
 
     @property
-    def options(self) -> Mapping[str, str]:
+    def options(self) -> dict[str, str]:
         """Choice by option."""
-        return self.variant.chosen
+        return dict(self.variant.chosen)
 
     @property
     def equation(self) -> Equation:

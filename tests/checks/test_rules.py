@@ -246,7 +246,10 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_windup",
         ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
-        ("10:42: external-reset is defined for the backward and forward rules",),
+        (
+            "10:42: external-reset is defined for the backward and forward rules",
+            "10:42: external-reset needs P on the error: positive feedback of another P settles beyond the limit",
+        ),
     ),
     (
         "reject_bad_windup",

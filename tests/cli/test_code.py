@@ -60,7 +60,8 @@ def test_scan_interval_action_and_limits_are_printed_in(action: Any) -> None:
     )  # fmt: skip
     scans = signals(0, 100)
     assert run_scan_by_scan(module, scans) == [controller.scan(*s) for s in scans]
-    assert f"scan 0.25 s, {action} acting" in module["__doc__"]
+    words = ("GAIN=1.5", "RESET=20", "RATE=4", "FORM=Series", "--scan", "0.25", "--action", action, "--limits", "10,90")
+    assert told("code", "emerson/deltav", *words).splitlines()[0].endswith(f"scan 0.25 s, {action} acting")
 
 
 def test_the_printed_run_does_what_scan_after_scan_does() -> None:

@@ -140,7 +140,7 @@ def test_a_refusal_says_why_and_what_would_be_nearest() -> None:
     assert (status, out) == (1, "")
     assert first == (
         "error: refused: emerson/deltav cannot do what honeywell/tdc3000 does: RATE would have to be negative, -115.714 s: "
-        "with these filters no positive one fits"
+        "with these filters no positive one fits; other options would do: --set FORM=Series --set STRUCTURE=0: exact"
     )
     assert second == "nearest settings, which 'pidemu convert --allow-approximate' gives:"
     assert [line.split(" = ")[0].strip() for line in rest[:-1]] == ["GAIN", "RESET", "RATE", "ALPHA"]

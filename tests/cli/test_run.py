@@ -12,7 +12,8 @@ import pytest
 import pidemu
 from tests.cli.helpers import Said, said
 
-PI = ("run", "generic/standard", "K=2", "Ti=10")
+PI_SETTINGS = pidemu.load_card("generic/standard").settings(K=2, Ti=10)
+PI = ("run", "generic/standard", "K=2", "Ti=10", "--scan", "1")
 RECORD = "sp,pv\n50,50\n51,50\n51,50.5\n51,51.25\n"
 
 
@@ -133,7 +134,7 @@ def test_a_file_from_a_spreadsheet_may_start_with_a_byte_order_mark(folder: Path
 
 def test_what_was_read_in_another_unit_is_noted(folder: Path) -> None:
     (folder / "record.csv").write_text(RECORD, encoding="utf-8")
-    err = said("run", "generic/standard", "K=2", "Ti=0.5 min", "--record", "record.csv").err
+    err = said("run", "generic/standard", "K=2", "Ti=0.5 min", "--scan", "1", "--record", "record.csv").err
     assert err == "note: Ti: 0.5 min is 30 s\n4 scans of 1 s, reverse acting\n"
 
 
@@ -141,3 +142,78 @@ def test_every_output_reads_back_as_the_same_number(folder: Path) -> None:
     sp = [50 + math.sin(i / 3) for i in range(50)]
     text = "sp,pv\n" + "".join(f"{x!r},50\n" for x in sp)
     assert expected(sp, [50.0] * 50) == emulated(recorded(folder, text).out)
+
+
+LOOP = ("run", "generic/standard", "K=2", "Ti=10", "--record", "record.csv")
+
+
+def noted(folder: Path, text: str, *words: str) -> list[str]:
+    (folder / "record.csv").write_text(text, encoding="utf-8")
+    result = said(*words)
+    assert result.status == 0
+    return [line.removeprefix("note: ") for line in result.err.splitlines() if line.startswith("note: ")]
+
+
+def test_the_interval_of_a_time_column_is_the_scan_interval(folder: Path) -> None:
+    (folder / "record.csv").write_text("time,sp,pv\n0,50,50\n10,51,50\n20,51,50\n", encoding="utf-8")
+    result = said(*LOOP)
+    assert result.err == "3 scans of 10 s, reverse acting\n"
+    assert emulated(result.out) == list(pidemu.Controller(PI_SETTINGS, 10.0).run([50, 51, 51], 50))
+
+
+def test_timestamps_are_a_time_column_too(folder: Path) -> None:
+    rows = "".join(f"2026-11-22T08:00:{s:02d},50,50\n" for s in (0, 5, 10))
+    (folder / "record.csv").write_text("timestamp,sp,pv\n" + rows, encoding="utf-8")
+    assert said(*LOOP).err == "3 scans of 5 s, reverse acting\n"
+
+
+@pytest.mark.parametrize(
+    ("times", "words", "message"),
+    [
+        (
+            ("0", "1", "2", "4"),
+            (),
+            "record.csv: the time column goes on by 2 s after sample 2 (counted from 0), elsewhere by 1 s; ",
+        ),
+        (
+            ("0", "2", "4"),
+            ("--scan", "1"),
+            "record.csv: the time column has a step of 2 s, --scan says 1 s; leave --scan out, or the column",
+        ),
+        (("0", "1", "noon"), (), "record.csv:4: column time: 'noon' is neither a number of seconds nor a timestamp such as "),
+        (("2", "1", "0"), (), "record.csv: the time column goes on by -1 s"),
+    ],
+    ids=["uneven", "contradicted", "no time", "backwards"],
+)
+def test_a_time_column_that_is_no_steady_clock_is_refused(
+    folder: Path, times: tuple[str, ...], words: tuple[str, ...], message: str
+) -> None:
+    (folder / "record.csv").write_text("time,sp,pv\n" + "".join(f"{t},50,50\n" for t in times), encoding="utf-8")
+    result = said(*LOOP, *words)
+    assert (result.status, result.out) == (2, "")
+    assert result.err.startswith(f"error: {message}")
+
+
+def test_an_interval_that_nobody_states_is_noted(folder: Path) -> None:
+    [note] = noted(folder, "sp,pv\n50,50\n", *LOOP)
+    assert note == "the scan interval is the card's default, 1 s: the record has no time column, and --scan is not given"
+
+
+def test_in_manual_the_recorded_output_is_followed_where_nothing_else_is_recorded(folder: Path) -> None:
+    text = "sp,pv,auto,output\n50,50,0,40\n50,50,0,42\n50,50,0,44\n50,50,1,44\n"
+    notes = noted(folder, text, *LOOP, "--scan", "1")
+    assert notes == ["in manual the recorded output is taken for the operator's: the record has no column 'manual'"]
+    assert emulated(said(*LOOP, "--scan", "1").out) == [40, 42, 44, 44]
+
+
+def test_manual_outputs_beyond_the_limits_are_noted(folder: Path) -> None:
+    notes = noted(folder, "sp,pv,auto,manual\n50,50,0,150\n50,50,0,-1\n50,50,1,0\n", *LOOP, "--scan", "1")
+    assert notes == ["in 2 samples the manual output is outside the output limits; it is taken as it is"]
+
+
+def test_a_controller_without_integral_and_bias_is_noted(folder: Path) -> None:
+    words = ("run", "fisher/provox", "GAIN=2", "RESET=off", "--scan", "1", "--record", "record.csv")
+    off, *notes = noted(folder, "sp,pv\n50,45\n", *words)
+    assert off.startswith("RESET: off is 0")
+    assert notes == ["there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"]
+    assert [n for n in noted(folder, "sp,pv\n50,45\n", *words, "--bias", "40") if "integral" in n] == []

@@ -93,11 +93,9 @@ SETTINGS = {
     f"convert generic/standard K=1 Ti=0 {_TO}": (
         "generic/standard: Ti: 0 s would be infinite action; the smallest value above zero is meant, or another unit"
     ),
-    f"convert honeywell/udc GAIN=2 RSET=80 {_TO}": (
-        "honeywell/udc: RSET: 80 min/repeat is outside 0.02 to 50 min/repeat; 0 switches it off"
-    ),
+    f"convert honeywell/udc GAIN=2 RSET=80 {_TO}": ("honeywell/udc: RSET: 80 min/repeat is outside 0.02 to 50 min/repeat"),
     f"convert honeywell/udc GAIN=2 RSET=9000_s/repeat {_TO}": (
-        "honeywell/udc: RSET: 150 min/repeat (given as 9000 s/repeat) is outside 0.02 to 50 min/repeat; 0 switches it off"
+        "honeywell/udc: RSET: 150 min/repeat (given as 9000 s/repeat) is outside 0.02 to 50 min/repeat"
     ),
     f"convert {_PI} GAIN=3 {_TO}": "GAIN is given twice, 2 and 3; give it once",
     f"convert {_PI} gain=3 {_TO}": "gain is given twice, 2 and 3; give it once",

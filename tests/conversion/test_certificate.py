@@ -69,9 +69,6 @@ def test_the_figures_are_those_of_the_two_block_diagrams(data: st.DataObject, na
                 # looks between the frequencies, so it may find a little more
                 found = (band.max_deviation, band.gain_db, band.phase_deg)
                 assert all(f >= o * (1 - 1e-6) - 1e-8 for f, o in zip(found, own, strict=True))
-                dense = figures(source, conversion.settings, np.geomspace(band.low, band.high, 40 * POINTS), setpoint=setpoint)
-                assert dense is not None
-                assert all(f <= d * 1.01 + 1e-6 for f, d in zip(found, dense, strict=True))
                 there = figures(source, conversion.settings, np.array([band.worst_at]), setpoint=setpoint)
                 assert there is not None
                 assert there[0] == pytest.approx(band.max_deviation, rel=1e-6, abs=1e-9)
@@ -173,7 +170,10 @@ def test_the_textbook_rule_enlarges_the_setpoint_kick_by_one_plus_Td_over_Ti() -
     kick = conversion.certificate.setpoint_kick
     assert (kick.source, kick.target) == pytest.approx((2, 2 * (1 + 6 / 15)))
     assert kick.ratio == pytest.approx(1.4)
-    assert any("the output jumps by 2.8 % per % at once, on the source by 2 (1.4 times)" in w for w in conversion.warnings)
+    assert any(
+        "the output jumps by 2.8 % per % at once, on the source it jumps by 2 % per % at once (1.4 times)" in w
+        for w in conversion.warnings
+    )
 
 
 def test_a_setpoint_weight_keeps_the_kick() -> None:

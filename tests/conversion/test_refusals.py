@@ -161,8 +161,8 @@ def test_where_nearest_settings_are_offered_they_are_returned_on_request_and_mar
     assert allowed.certificate.feedback.loop_band.max_deviation < 1, "farther than no controller at all"
 
 
-NONE_NEAR = ("integral and derivative into standard", "no integral", "no integral with D on PV")
-"""A zero on the imaginary axis, which nothing with proportional action comes near; an integral that the target has not."""
+NONE_NEAR = (*(r.title for r in NO_GAIN), "no integral", "no integral with D on PV")
+"""Without proportional action only ever smaller gains come nearer, which is no advice; and an integral that the target has not."""
 
 OFFERED = [r for r in ALL if r.title not in NONE_NEAR]
 
@@ -194,7 +194,7 @@ TRIALS = 2000
 
 @pytest.mark.parametrize(
     "refusal",
-    [r for r in OFFERED if r not in NO_GAIN and r.title != "no proportional"],
+    [r for r in OFFERED if r.title != "no proportional"],
     ids=str,
 )
 def test_no_random_settings_that_keep_the_integral_gain_are_nearer(refusal: Refusal) -> None:
@@ -228,15 +228,8 @@ def test_no_random_settings_that_keep_the_integral_gain_are_nearer(refusal: Refu
     assert deviation(wanted, w, s) <= 1.02 * best
 
 
-@pytest.mark.parametrize("refusal", [r for r in OFFERED if r in NO_GAIN], ids=str)
-def test_integral_action_alone_is_approached_by_a_small_gain_with_a_short_integral_time(refusal: Refusal) -> None:
-    """No settings are the nearest here: the smaller the gain, the nearer; the search stops at a thousandth."""
-    band = refusal.nearest().certificate.feedback.loop_band
-    assert band.max_deviation < 0.01
-
-
 def test_a_missing_proportional_term_is_approached_by_a_long_filtered_derivative() -> None:
-    """Again no settings are the nearest: ``kd s/(1 + Tf s)`` with a long ``Tf`` is a proportional term of ``kd/Tf``."""
+    """No settings are the nearest: ``kd s/(1 + Tf s)`` with a long ``Tf`` is a proportional term of ``kd/Tf``."""
     refusal = next(r for r in SHAPE if r.title == "no proportional")
     nearest = refusal.nearest()
     assert nearest.certificate.feedback.loop_band.max_deviation < 0.1

@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.algorithm import Algorithm, Place, Scheme
+from pidemu.card.load import variants
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
 from pidemu.law import Law
 from pidemu.scan.build import build
 from pidemu.scan.program import Binary, Expr, Name, Number, Operator, Program, Select
+from pidemu.settings import is_active
 from pidemu.targets.python import compiled, render, source
 from tests.helpers import WIDE, Floats, outputs, scans_of, settings_of
 
@@ -419,7 +421,8 @@ def by_clamp_sum(c: Pid, x: Record) -> list[float]:
 def by_freeze(c: Pid, x: Record) -> list[float]:
     u, I = [U0], U0 - c.P(x, 0)  # noqa: E741
     for n in range(1, len(x.sp)):
-        if LOW < u[-1] < HIGH:
+        further_up, further_down = u[-1] >= HIGH and c.dI(x, n) > 0, u[-1] <= LOW and c.dI(x, n) < 0
+        if not (further_up or further_down):
             I += c.dI(x, n)  # noqa: E741
         u.append(clip(c.P(x, n) + I + c.D(x, n)))
     return u
@@ -655,3 +658,34 @@ def test_the_printed_module_of_every_card_gives_the_same_bits_as_its_compiled_fu
     printed = [module["scan"](state, *(float(signal[n]) for signal in (x.sp, x.pv, x.auto, x.manual))) for n in range(len(x.sp))]
     assert run(program, x).tolist() == printed
     assert list(states_after(program, x).values()) == state
+
+
+@pytest.mark.parametrize("name", pidemu.cards())
+def test_no_controller_stays_at_a_limit_once_the_error_has_turned(name: str) -> None:
+    """Ten minutes of error at the limit, then an error the other way: the output leaves within the time its scheme takes.
+
+    The longest is that of schemes that let the integral go on: PLC and DCS cards must do better than the error's own duration.
+    """
+    card = pidemu.load_card(name)
+    for variant in variants(card):
+        given: dict[str, object] = dict(variant.chosen)
+        parallel = variant.equation.form == "parallel"
+        texts = {"gain": 3.0, "integral": "0.05 1/s" if parallel else "60 s", "derivative": 0.0}
+        for dial, s in variant.equation.settings.items():
+            if s.sets in texts and is_active(variant.equation, dial, s) and not (s.sets == "derivative" and s.default is not None):
+                given[dial] = "300 %" if s.sets == "gain" and s.unit == "%" else texts[s.sets]
+        settings_ = card.settings(given)
+        if not settings_.algorithm().ki:
+            continue
+        controller = pidemu.Controller(settings_, 1.0, output_limits=(0, 100), initial_output=50.0)
+        controller.run([50.0, *[60.0] * 600], [50.0, *[20.0] * 600])
+        back = controller.run(60.0, np.full(120, 65.0))
+        assert controller.output < 100
+        assert np.argmax(back < 100) <= 60, (variant.chosen, back[:5])
+
+
+def test_a_controller_that_starts_at_a_limit_leaves_it_while_the_error_asks_for_it() -> None:
+    """A freeze in both directions would hold the output at the limit for ever."""
+    settings_ = pidemu.load_card("allen-bradley/plc5").settings(KP=1, KI=0.1)
+    outputs = pidemu.Controller(settings_, 1.0, initial_output=0.0).run(60.0, np.full(40, 50.0))
+    assert outputs[-1] > 30

@@ -12,7 +12,8 @@ from pidemu.errors import CardNotFoundError, suggest
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
 
-_loaded: dict[tuple[Path, int], Card] = {}
+_loaded: dict[tuple[Path, str | None], tuple[int, Card]] = {}
+"""Cards read so far, by file and id, with the time the file was changed."""
 
 
 def builtin_folder() -> Path:
@@ -65,12 +66,12 @@ def cards(vendors: Sequence[str | Path] = ()) -> list[str]:
     return list(card_files(vendors))
 
 
-def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
+def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     """Return a card.
 
     Parameters
     ----------
-    name : str
+    name : str or path
         The card's id, such as ``"fisher/provox"``, or the path of a ``.yaml`` file.
     vendors : sequence of path, optional
         Folders of the user's own cards, searched before the built-in ones.
@@ -87,7 +88,9 @@ def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
     CardError
         The card is wrong.
     """
+    name = name.as_posix() if isinstance(name, Path) else name
     file = Path(name) if name.endswith((".yaml", ".yml")) else None
+    card_id = name if file is None else None
     if file is None:
         file = next((f for d in folders(vendors) if (f := d / f"{name}.yaml").is_file()), None) if _is_id(name) else None
         if file is None:
@@ -96,10 +99,11 @@ def load_card(name: str, vendors: Sequence[str | Path] = ()) -> Card:
             raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
     elif not file.is_file():
         raise CardNotFoundError(f"no file '{name}'")
-    key = (file.resolve(), file.stat().st_mtime_ns)
-    if key not in _loaded:
-        _loaded[key] = load_file(file)
-    return _loaded[key]
+    key, changed = (file.absolute(), card_id), file.stat().st_mtime_ns
+    kept = _loaded.get(key)
+    if kept is None or kept[0] != changed:
+        kept = _loaded[key] = (changed, load_file(file, card_id))
+    return kept[1]
 
 
 def _suggest_block(name: str, known: list[str]) -> str:

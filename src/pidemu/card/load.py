@@ -66,7 +66,7 @@ def variants(card: Card) -> Iterator[Variant]:
         yield card.variant(dict(zip(names, choice, strict=True)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Statement:
     """One field of a variant's equation and how sure it is.
 
@@ -110,7 +110,7 @@ class Statement:
         return f"{self.path} = {self.value}{note}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Variant:
     """A card with its options chosen.
 
@@ -128,6 +128,11 @@ class Variant:
     chosen: Mapping[str, str]
     equation: Equation
     raw: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def choice_text(self) -> str:
+        """The options chosen, in words."""
+        return ", ".join(f"{option}={choice}" for option, choice in self.chosen.items())
 
     def home(self, path: Path_) -> Path_:
         """Return where a field of the equation stands in the file: in a chosen overlay, or in the card itself."""

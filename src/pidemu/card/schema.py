@@ -186,9 +186,9 @@ def schema_text() -> str:
 def main() -> None:
     """Write both files of the repository."""
     specs = Path(__file__).resolve().parents[3] / "specs"
-    (specs / "card.schema.json").write_text(schema_text(), encoding="utf-8")
+    (specs / "card.schema.json").write_text(schema_text(), encoding="utf-8", newline="\n")
     language = specs / "card-language.md"
-    language.write_text(updated(language.read_text(encoding="utf-8")), encoding="utf-8")
+    language.write_text(updated(language.read_text(encoding="utf-8")), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -187,7 +187,7 @@ def parse(text: str, path: str) -> Document:
         message = f"not YAML: {error.problem or error.context}"
         reader.problems.append(Problem(path, line, column, message, 1, document.lines))
     except yaml.reader.ReaderError as error:
-        before = text.encode()[: error.position].decode(errors="ignore")  # the parser counts bytes
+        before = text.encode(errors="surrogatepass")[: error.position].decode(errors="ignore")  # the parser counts bytes
         code = error.character if isinstance(error.character, int) else ord(error.character)
         line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
         message = f"character U+{code:04X} is not allowed in YAML; remove it"

@@ -8,7 +8,7 @@ from typing import Final
 
 from pidemu.card.load import Card, Variant, variants
 from pidemu.emulator import Controller
-from pidemu.errors import PidemuError, Problem
+from pidemu.errors import PidemuError, Problem, UndefinedError
 from pidemu.settings import Settings, is_active, limits, off_values
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
@@ -49,11 +49,12 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
     for variant in variants(card):
         try:
             Controller(_plausible(variant)).scan(50.0, 49.0)
+        except UndefinedError:
+            continue
         except PidemuError as error:
-            if "not defined" not in str(error):
-                chosen = ", ".join(f"{o}={c}" for o, c in variant.chosen.items())
-                message = f"with {chosen}: {error}" if chosen else str(error)
-                yield card.document.problem(("options",) if chosen else ("settings",), message)
+            chosen = variant.choice_text
+            message = f"with {chosen}: {error}" if chosen else str(error)
+            yield card.document.problem(("options",) if chosen else ("settings",), message)
 
 
 def _plausible(variant: Variant) -> Settings:

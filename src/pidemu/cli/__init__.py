@@ -70,6 +70,9 @@ def main(arguments: list[str] | None = None) -> None:
     arguments : list of str, optional
         What follows ``pidemu``; by default what was typed.
     """
+    for stream in (sys.stdout, sys.stderr):  # a console that lacks a character shows its escape
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
         status = cli.main(arguments, prog_name="pidemu", standalone_mode=False)
     except click.exceptions.Abort:

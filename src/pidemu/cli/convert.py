@@ -158,10 +158,6 @@ def _print(c: Conversion, round_dials: bool) -> None:
         )
 
 
-def _chosen(s: Settings) -> str:
-    return ", ".join(f"{o}={v}" for o, v in s.options.items())
-
-
 def _unit(v: Value) -> str:
     return "" if v.unit == "1" else v.unit
 
@@ -184,7 +180,7 @@ def _other_units(v: Value) -> str:
 
 
 def _side(title: str, s: Settings) -> None:
-    heading(f"\n{title}: {s.card.title}" + (f"  [{_chosen(s)}]" if s.options else ""))
+    heading(f"\n{title}: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
     rows = [
         [name, number(v.value), _unit(v), _other_units(v), "" if v.given else "card's default"] for name, v in s.items() if v.active
     ]
@@ -193,7 +189,7 @@ def _side(title: str, s: Settings) -> None:
 
 def _target(c: Conversion) -> None:
     s, book = c.settings, c.textbook.settings
-    heading(f"\nTo: {s.card.title}" + (f"  [{_chosen(s)}]" if s.options else ""))
+    heading(f"\nTo: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
     rows = []
     for name, v in s.items():
         if v.active:

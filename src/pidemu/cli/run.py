@@ -91,7 +91,8 @@ def _write(record: Record, emulated: Floats, target: str | None) -> None:
 def _notes(record: Record, controller: Controller, step: float | None, bias: float, limits: tuple[float, float]) -> Iterator[str]:
     """Yield what was taken for granted."""
     if step is None:
-        yield f"the scan interval is the card's default, {number(controller.interval)} s: the record has no time column, and --scan is not given"
+        default = f"{number(controller.interval)} s"
+        yield f"the scan interval is the card's default, {default}: the record has no time column, and --scan is not given"
     by_hand = np.zeros(record.sp.size, dtype=bool) if record.auto is None else record.auto == 0
     manual = record.output if record.manual is None else record.manual
     if record.manual is None and by_hand.any() and manual is not None:

@@ -47,7 +47,7 @@ def better_options(
         changed = {n: c for n, c, d in zip(free, combination, defaults, strict=True) if c != d}
         found = _attempt(solver, {**taken, **changed}) if changed else None
         if found is not None and (present is None or _improves(present, found)):
-            key = (_RANK[found.verdict], found.setpoint.loop_band.max_deviation, len(changed))
+            key = (_RANK[found.verdict], round(found.setpoint.loop_band.max_deviation, 9), len(changed))
             if best is None or key < best[0]:
                 best = (key, changed, found)
     if best is None:

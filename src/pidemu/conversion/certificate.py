@@ -244,7 +244,10 @@ def compare_paths(
     def scaled(w: Floats) -> Response:
         return factor * source.response(w, path)
 
-    return PathComparison(*(compare(scaled, lambda w: target.response(w, path), low, high) for low, high in limits))
+    loop, full = (compare(scaled, lambda w: target.response(w, path), low, high) for low, high in limits)
+    worse = loop if loop.max_deviation > full.max_deviation else full  # the full band holds the loop band
+    gain, phase = max(loop.gain_db, full.gain_db), max(loop.phase_deg, full.phase_deg)
+    return PathComparison(loop, Band(full.low, full.high, worse.max_deviation, gain, phase, worse.worst_at))
 
 
 def certify(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, Final
 
 from pidemu.card.library import load_card
@@ -14,10 +15,10 @@ from pidemu.conversion.certificate import Certificate, Rounded, Verdict
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.solve import Match, Solver
 from pidemu.conversion.target import Target
-from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
+from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.plain import json_safe
-from pidemu.settings import Settings, limits
-from pidemu.units import Role
+from pidemu.settings import Settings, Value, limits
+from pidemu.units import Role, is_reciprocal, parse_unit
 
 MATCHES: Final = ("exact", "low-frequency", "textbook")
 """Matches a user may ask for; by default exact where possible, else low-frequency."""
@@ -182,7 +183,9 @@ def convert(
     ConversionRefusedError
         The target cannot do what the source does; the error holds the nearest settings and what they would cost.
     SettingError, CardError
-        The target, an option or a given dial is unknown, or a range of the source is missing.
+        The target, the match, an option or a given dial is unknown, or a range of the source is missing.
+    ScanError
+        A scan interval is no positive number, or a filter is unstable at it.
 
     Examples
     --------
@@ -193,10 +196,10 @@ def convert(
     ('exact', 2.6667, 20.0, 3.75)
     """
     if match is not None and match not in MATCHES:
-        raise PidemuError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
+        raise SettingError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
     card = load_card(target) if isinstance(target, str) else target
     factor = _rescaling(source, pv_range, op_range)
-    scans = (float(scan), float(scan)) if isinstance(scan, int | float) else scan
+    scans = _scans(scan)
     same = source.card.id == card.id
     chosen = {**(source.options if same else {}), **_named_as(card, options or {})}
     fixed = {**_shared(source, card), **(given or {})}
@@ -217,6 +220,19 @@ def convert(
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)
     return conversion
+
+
+def _scans(scan: float | tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return the scan intervals of source and target [s]."""
+    if scan is None:
+        return None
+    try:
+        pair = (float(scan), float(scan)) if isinstance(scan, Real) else tuple(float(h) for h in scan)  # type: ignore[union-attr]
+    except (TypeError, ValueError):
+        pair = ()
+    if len(pair) != 2:
+        raise ScanError(f"scan is {scan!r}; it is an interval in seconds, or two: (1.0, 0.5)")
+    return pair[0], pair[1]
 
 
 def _named_as(card: Card, options: Mapping[str, object]) -> dict[str, object]:
@@ -270,18 +286,17 @@ def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float
 
 def _rounded(settings: Settings) -> tuple[Settings, tuple[Rounded, ...]]:
     """Round every dial that has a resolution."""
-    dials = []
-    values: dict[str, object] = {}
-    for name, value in settings.items():
-        step = value.setting.resolution
-        new = value.value
-        if step is not None and value.active and not value.off:
-            new = round(value.value / step) * step
-            low, high = value.setting.range or (0.0, float("inf"))
-            new = float(f"{min(max(new, low), high):.12g}")
-            if new != value.value:
-                dials.append(Rounded(name, value.value, new))
-        values[name] = new
-    ranges = {k: v for k, v in (("pv_range", settings.pv_range), ("op_range", settings.op_range)) if v is not None}
-    chosen = {o: c for o, c in settings.options.items() if o not in settings.defaulted}
-    return settings.card.settings({**chosen, **values, **ranges}), tuple(dials)
+    values = {name: _round(value) for name, value in settings.items()}
+    dials = tuple(Rounded(n, settings[n].value, v.value) for n, v in values.items() if v.value != settings[n].value)
+    return replace(settings, values_by_name=values), dials
+
+
+def _round(value: Value) -> Value:
+    step = value.setting.resolution
+    if step is None or not value.active or value.off:
+        return value
+    low, high = limits(value.setting)
+    new = float(f"{min(max(round(value.value / step) * step, low), high):.12g}")
+    if new == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
+        new = step  # zero would be infinite action
+    return replace(value, value=new)

@@ -53,7 +53,7 @@ def check_terms(source: Algorithm, target: Target) -> None:
 
 
 def _chosen(target: Target) -> str:
-    chosen = ", ".join(f"{o}={c}" for o, c in target.variant.chosen.items())
+    chosen = target.variant.choice_text
     return f" ({chosen})" if chosen else ""
 
 

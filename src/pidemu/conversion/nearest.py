@@ -94,7 +94,11 @@ def _range(target: Target, role: Role) -> tuple[float, float]:
 
 def _clip(wide: tuple[float, float], allowed: tuple[float, float]) -> tuple[float, float]:
     low, high = max(wide[0], allowed[0]), min(wide[1], allowed[1])
-    return (low, high) if low < high else (allowed[0], max(allowed[0] * 1.001, min(allowed[1], allowed[0] * 1e3)))
+    if low < high:
+        return low, high
+    if wide[0] >= allowed[1]:  # all that is allowed lies below
+        return max(allowed[0], allowed[1] * 1e-3), allowed[1]
+    return allowed[0], min(allowed[1], allowed[0] * 1e3)
 
 
 def _middle(ends: tuple[float, float]) -> float:

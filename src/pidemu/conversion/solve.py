@@ -16,7 +16,7 @@ from pidemu.conversion.nearest import nearest
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import SettingError
 from pidemu.law import Law
-from pidemu.settings import Settings
+from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
 Match = Literal["exact", "low-frequency", "textbook", "constrained"]
@@ -68,9 +68,9 @@ class Solver:
             reason = f"{self.target.card.id} cannot do what {self.source.card.id} does: {error}"
         a = self.scaled.algorithm
         idle = not a.kp and self.target.has_proportional  # nothing practicable imitates a missing proportional term
-        numbers = None if idle else nearest(self.law, self.target, self.factor)
-        if numbers is not None:
-            with suppress(SettingError):
+        with suppress(SettingError):
+            numbers = None if idle else nearest(self.law, self.target, self.factor)
+            if numbers is not None:
                 return self._weighted(numbers), "constrained", reason
         return None, "constrained", f"{reason}; no settings of it come near"
 
@@ -182,8 +182,7 @@ class Solver:
             if i == 0 or rank < _RANK["approximate"]:
                 found.append((rank, settings))
         if not found:
-            assert refused is not None
-            raise refused
+            raise refused or NoMatchError("the numbers leave the range of floating point")
         return min(found, key=lambda pair: pair[0])[1]
 
     def _time_of(self, filt: TargetFilter, numbers: Numbers) -> float:
@@ -214,7 +213,7 @@ class Solver:
         dial = self.target.dial(role)
         if dial is None or weight is None:
             return None
-        low, high = dial[1].range or (0.0, 1.0)
+        low, high = limits(dial[1])
         return min(max(weight, low), high)
 
 

@@ -224,7 +224,7 @@ def _start_and_grow(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, gr
         total = total if moved is None else total + moved
         b.let("I", total, "integral; at a transfer loaded with the last output (section 6)")
     else:
-        start = _sum([t.u - P, None]) if t.D is None else t.u - P - t.D
+        start = t.u - P if t.D is None else t.u - P - t.D
         grow = state if now is None else state + now
         grow = grow if moved is None else grow + moved
         b.let("I", select(t.on, grow, start), "integral; at a transfer u - P - D, bumpless (section 6)")

@@ -105,7 +105,7 @@ def source(program: Program) -> str:
     program : Program
         What to print.
     """
-    lines = [f'"""{program.title}"""', ""]
+    lines = [f"# {' '.join(program.title.split())}", ""]
     for quantity, value in zip(program.coefficients, program.values, strict=True):
         lines.append(f"{f'{quantity.name} = {_literal(value)}':<32}  # {quantity.text} [{quantity.unit}]")
     lines += ["", "# kept from scan to scan"]

@@ -1,0 +1,177 @@
+"""Options, signs and ranges: what a conversion decides, keeps, or tells the user to decide."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pidemu
+from pidemu.card.load import variants
+from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
+from pidemu.settings import Settings, is_active
+from tests.checks.bench import VALID, edited, written
+
+
+def usual(card_id: str) -> list[Settings]:
+    """Settings of every variant of a card, with usual numbers: gain 2, 100 s, 10 s."""
+    found = []
+    card = pidemu.load_card(card_id)
+    for variant in variants(card):
+        given: dict[str, object] = dict(variant.chosen)
+        parallel = variant.equation.form == "parallel"
+        texts = {"gain": 2.0, "integral": "0.02 1/s" if parallel else "100 s", "derivative": "20 s" if parallel else "10 s"}
+        for name, s in variant.equation.settings.items():
+            if s.sets in texts and is_active(variant.equation, name, s):
+                given[name] = "200 %" if s.sets == "gain" and s.unit == "%" else texts[s.sets]
+        try:
+            found.append(card.settings(given))
+            found[-1].algorithm()
+        except SettingError:
+            found.pop()
+    return found
+
+
+SOURCES = [(c, usual(c)[0]) for c in pidemu.cards()]
+
+
+@pytest.mark.parametrize(("source", "target"), list(itertools.product(pidemu.cards(), pidemu.cards())))
+def test_the_textbook_column_is_what_the_textbook_match_gives(source: str, target: str) -> None:
+    settings = dict(SOURCES)[source]
+    try:
+        shown = pidemu.convert(settings, target).textbook
+    except ConversionRefusedError:
+        return
+    if shown.settings is None:
+        with pytest.raises(ConversionRefusedError):
+            pidemu.convert(settings, target, match="textbook")
+    else:
+        asked = pidemu.convert(settings, target, match="textbook")
+        assert {n: v.value for n, v in shown.settings.items()} == {n: v.value for n, v in asked.settings.items()}
+        assert shown.certificate is not None
+        assert shown.certificate.feedback == asked.certificate.feedback
+
+
+@pytest.mark.parametrize("card_id", pidemu.cards())
+def test_a_card_to_itself_keeps_its_options_and_is_exact(card_id: str) -> None:
+    for settings in usual(card_id):
+        conversion = pidemu.convert(settings, card_id)
+        assert conversion.settings.options == settings.options
+        assert conversion.verdict == "exact"
+
+
+def test_weights_above_one_are_kept() -> None:
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=10, b=1.5)
+    conversion = pidemu.convert(source, "generic/standard")
+    assert (conversion.verdict, conversion.settings["b"].value) == ("exact", 1.5)
+
+
+def test_a_refusal_names_the_options_that_would_do() -> None:
+    source = pidemu.load_card("emerson/deltav").settings(GAIN=2, STRUCTURE="4")
+    with pytest.raises(ConversionRefusedError, match="other options would do: --set MODE=P: exact"):
+        pidemu.convert(source, "foxboro/ia-pid")
+
+
+def test_a_better_choice_of_options_is_named() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    assert pidemu.convert(source, "emerson/deltav").better == "--set FORM=Series: exact"
+    better = pidemu.convert(source, "honeywell/tdc3000").better
+    assert better is not None
+    assert better.startswith("--set CTEQN=B: approximate, deviation of the setpoint path ")
+
+
+def test_options_that_the_user_chose_are_not_questioned() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    options = {"FORM": "Standard", "STRUCTURE": "1"}
+    assert pidemu.convert(source, "emerson/deltav", options=options).better is None
+
+
+def test_negative_gains_become_positive_ones_with_the_other_action() -> None:
+    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2, Ki=-0.05)
+    conversion = pidemu.convert(source, "emerson/deltav")
+    assert (conversion.settings["GAIN"].value, conversion.settings["RESET"].value) == (2, 40)
+    assert conversion.verdict == "exact"
+    assert any("gains are negative" in w and "'Direct' where the source was reverse acting" in w for w in conversion.warnings)
+    sp, pv = np.full(50, 50.0), 50 + np.sin(np.arange(50) / 5)
+    old = pidemu.Controller(source, 1.0, output_limits=(-1e6, 1e6)).run(sp, pv)
+    new = pidemu.Controller(conversion.settings, 1.0, "direct", output_limits=(-1e6, 1e6)).run(sp, pv)
+    assert np.max(np.abs(np.diff(old) - np.diff(new))) < 1e-9
+
+
+def test_gains_of_both_signs_are_refused() -> None:
+    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=2, Ki=-0.05)
+    with pytest.raises(ConversionRefusedError, match="would have to be negative"):
+        pidemu.convert(source, "emerson/deltav")
+
+
+def test_a_card_in_engineering_units_takes_the_ranges() -> None:
+    source = pidemu.load_card("bailey/fc19").settings(KP=2, KI=0.5, pv_range=(0, 300), op_range=(0, 100))
+    conversion = pidemu.convert(source, "emerson/deltav")
+    assert (conversion.settings["GAIN"].value, conversion.settings["RESET"].value) == (6, 240)
+    assert not any("no ranges" in w or "not all ranges" in w for w in conversion.warnings)
+
+
+def test_without_ranges_a_card_in_engineering_units_says_what_is_taken() -> None:
+    source = pidemu.load_card("bailey/fc19").settings(KP=2, KI=0.5)
+    assert any("spans not given are taken as 100" in w for w in pidemu.convert(source, "emerson/deltav").warnings)
+
+
+@pytest.mark.parametrize("value", ["2 eu/eu", "50 eu", "2 %/eu"])
+def test_a_gain_in_engineering_units_needs_the_ranges(value: str) -> None:
+    card = pidemu.load_card("fisher/provox")
+    with pytest.raises(SettingError, match=r"pv_range.* must be given"):
+        card.settings(GAIN=value, RESET=4)
+    assert card.settings(GAIN=value, RESET=4, pv_range=(0, 200), op_range=(0, 100))["GAIN"].value == 4
+
+
+def test_with_scan_intervals_the_kick_is_the_move_of_the_first_scan() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    conversion = pidemu.convert(source, "honeywell/tdc3000", scan=(1.0, 0.5))
+    kick = conversion.certificate.setpoint_kick_at_scan
+    assert kick is not None
+    for settings, h, stated in ((source, 1.0, kick.source), (conversion.settings, 0.5, kick.target)):
+        outputs = pidemu.Controller(settings, h, output_limits=(-1e6, 1e6)).run([50, 51], 50)
+        assert outputs[1] - outputs[0] == pytest.approx(stated, rel=1e-12)
+
+
+@pytest.mark.parametrize("scan", [(1.0,), (), (1, 2, 3), "1", (0.0, 1.0), (1.0, float("nan")), -1])
+def test_a_scan_that_is_no_interval_or_two_is_refused(scan: object) -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    with pytest.raises(ScanError):
+        pidemu.convert(source, "emerson/deltav", scan=scan)  # type: ignore[arg-type]
+
+
+def test_numpy_numbers_are_scan_intervals() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    assert pidemu.convert(source, "emerson/deltav", scan=np.float32(0.5)).scan == (0.5, 0.5)  # type: ignore[arg-type]
+
+
+def test_the_options_of_settings_are_a_copy() -> None:
+    settings = pidemu.load_card("emerson/deltav").settings(GAIN=2, RESET=60)
+    settings.options["FORM"] = "Bogus"
+    assert pidemu.load_card("emerson/deltav").settings(GAIN=2, RESET=60).options["FORM"] == "Standard"
+
+
+def test_rounding_keeps_notes_and_never_makes_an_infinite_gain(tmp_path: Path) -> None:
+    text = edited(
+        VALID,
+        ('GAIN: {sets: gain, unit: "%/%"}', 'GAIN: {sets: gain, unit: "%", resolution: 5}'),
+        ("{GAIN: 2, RESET: 60, RATE: 16}", "{GAIN: 50, RESET: 60, RATE: 16}"),
+    )
+    target = pidemu.load_card(written(tmp_path, text))
+    source = pidemu.load_card("generic/standard").settings(K=100, Ti="1 min")
+    conversion = pidemu.convert(source, target, round_dials=True)
+    assert conversion.settings["GAIN"].value == 5
+    assert [d.name for d in conversion.certificate.dials] == ["GAIN"]
+    assert conversion.source.notes == ("Ti: 1 min is 60 s",)
+
+
+@pytest.mark.parametrize("limits", ["[0, 10]", "[0, 1e-6]", "[1e6, 1e7]"])
+def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, limits: str) -> None:
+    text = edited(VALID, ('GAIN: {sets: gain, unit: "%/%"}', f'GAIN: {{sets: gain, unit: "%/%", range: {limits}}}'))
+    target = pidemu.load_card(written(tmp_path, text))
+    source = pidemu.load_card("generic/standard").settings(K=20000, Ti=10, Td=1)
+    with pytest.raises(PidemuError, match="outside"):
+        pidemu.convert(source, target)
