@@ -150,7 +150,7 @@ def test_a_low_frequency_match_keeps_the_moments(
 
 
 @given(data=st.data(), card=st.sampled_from(CARDS), target=st.sampled_from(TARGETS))
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_the_deviation_of_a_low_frequency_match_falls_with_the_cube_of_the_frequency(
     data: st.DataObject, card: str, target: tuple[str, Mapping[str, object], Mapping[str, object]]
 ) -> None:

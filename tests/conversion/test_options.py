@@ -76,7 +76,7 @@ def test_a_refusal_names_the_options_that_would_do() -> None:
 
 def test_a_better_choice_of_options_is_named() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    assert pidemu.convert(source, "emerson/deltav").better == "--set FORM=Series: exact"
+    assert pidemu.convert(source, "emerson/deltav").better == "--set STRUCTURE=7: exact"
     better = pidemu.convert(source, "honeywell/tdc3000").better
     assert better is not None
     assert better.startswith("--set CTEQN=B: approximate, deviation of the setpoint path ")

@@ -110,7 +110,7 @@ class Statement:
         return f"{self.path} = {self.value}{note}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Variant:
     """A card with its options chosen.
 
@@ -126,8 +126,11 @@ class Variant:
 
     card: Card
     chosen: Mapping[str, str]
-    equation: Equation
-    raw: Mapping[str, Any] = field(repr=False)
+    equation: Equation = field(compare=False)
+    raw: Mapping[str, Any] = field(repr=False, compare=False)
+
+    def __hash__(self) -> int:
+        return hash((self.card.id, *self.chosen.values()))
 
     @property
     def choice_text(self) -> str:
