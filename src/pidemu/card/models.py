@@ -37,6 +37,7 @@ class Model(BaseModel):
         alias_generator=_hyphen,
         populate_by_name=False,
         str_strip_whitespace=True,
+        defer_build=True,  # parts are built within the whole; by themselves only where they are used
     )
 
 

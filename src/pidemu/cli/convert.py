@@ -25,7 +25,6 @@ from pidemu.cli.common import (
 )
 from pidemu.conversion.certificate import EXACT, Band, Certificate, PathComparison
 from pidemu.conversion.convert import MATCHES, Conversion, convert
-from pidemu.conversion.loopfile import read_loop
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings, Value
 from pidemu.units import Role
@@ -88,6 +87,8 @@ def command(
     given = assignments(values)
     wanted = assignments(fixed, "NAME=VALUE after --set")
     if loop_file is not None:
+        from pidemu.conversion.loopfile import read_loop
+
         loop = read_loop(Path(loop_file))
         card, given = card or loop.card, overridden(loop.settings, given)
         target, wanted = target or loop.to, overridden(loop.set, wanted)

@@ -42,14 +42,17 @@ def better_options(
     kept = {name.casefold() for name in taken}
     free = [name for name in card.options if name.casefold() not in kept]
     defaults = tuple(card.options[name][0] for name in free)
-    best: tuple[tuple[int, float, int], Mapping[str, str], Certificate] | None = None
-    for combination in itertools.islice(itertools.product(*(card.options[name] for name in free)), _MOST):
-        changed = {n: c for n, c, d in zip(free, combination, defaults, strict=True) if c != d}
-        found = _attempt(solver, {**taken, **changed}) if changed else None
+    combinations = itertools.product(*(card.options[name] for name in free))
+    changes = [{n: c for n, c, d in zip(free, chosen, defaults, strict=True) if c != d} for chosen in combinations]
+    best: tuple[tuple[int, float], Mapping[str, str], Certificate] | None = None
+    for changed in sorted(changes, key=len)[1 : _MOST + 1]:  # the fewest changes first, without none at all
+        found = _attempt(solver, {**taken, **changed})
         if found is not None and (present is None or _improves(present, found)):
-            key = (_RANK[found.verdict], round(found.setpoint.loop_band.max_deviation, 9), len(changed))
+            key = (_RANK[found.verdict], found.setpoint.loop_band.max_deviation)
             if best is None or key < best[0]:
                 best = (key, changed, found)
+            if found.verdict == "exact":
+                break
     if best is None:
         return None
     words = " ".join(f'--set "{n}={c}"' if " " in c else f"--set {n}={c}" for n, c in best[1].items())

@@ -170,6 +170,9 @@ class Solver:
         SettingError
             None of these lies within the target's ranges; the first one's reason.
         """
+        solutions = tuple(solutions)
+        if len(solutions) == 1:
+            return self._weighted(solutions[0])
         found: list[tuple[int, Settings]] = []
         refused: SettingError | None = None
         for i, numbers in enumerate(solutions):
