@@ -175,3 +175,13 @@ def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, 
     source = pidemu.load_card("generic/standard").settings(K=20000, Ti=10, Td=1)
     with pytest.raises(PidemuError, match="outside"):
         pidemu.convert(source, target)
+
+
+def test_noise_is_compared_without_the_sign_of_the_gains() -> None:
+    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2, Ki=-0.05, Kd=-20)
+    assert any("measurement noise" in w for w in pidemu.convert(source, "emerson/deltav").warnings)
+
+
+def test_a_card_file_is_a_target(tmp_path: Path) -> None:
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=60)
+    assert pidemu.convert(source, written(tmp_path, VALID)).settings.card.id == "nobody/bench"

@@ -98,7 +98,7 @@ def _alike(x: float, y: float) -> bool:
 def _noise(c: Conversion) -> Iterator[str]:
     high = c.certificate.feedback.full_band.high
     source, target = (abs(complex(s.law().response(high))) for s in (c.source, c.settings))
-    ratio = target / (source * c.factor) if source else math.inf
+    ratio = target / (source * abs(c.factor)) if source else math.inf
     if ratio > _NOISE:
         yield f"measurement noise: at {high:.3g} rad/s the target's gain is {ratio:.3g} times the source's"
     elif 0 < ratio < 1 / _NOISE:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
+from pathlib import Path
 from typing import Any, Final
 
 from pidemu.card.library import load_card
@@ -138,7 +139,7 @@ def _plain(s: Settings) -> dict[str, Any]:
 
 def convert(
     source: Settings,
-    target: str | Card,
+    target: str | Path | Card,
     *,
     options: Mapping[str, object] | None = None,
     given: Mapping[str, object] | None = None,
@@ -155,8 +156,8 @@ def convert(
     ----------
     source : Settings
         The settings.
-    target : str or Card
-        The card to convert to, or its id.
+    target : str, path or Card
+        The card to convert to, its id, or its file.
     options : mapping, optional
         Options of the target; those not named take the card's defaults.
     given : mapping, optional
@@ -197,7 +198,7 @@ def convert(
     """
     if match is not None and match not in MATCHES:
         raise SettingError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
-    card = load_card(target) if isinstance(target, str) else target
+    card = target if isinstance(target, Card) else load_card(target)
     factor = _rescaling(source, pv_range, op_range)
     scans = _scans(scan)
     same = source.card.id == card.id
