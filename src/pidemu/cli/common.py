@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
+import textwrap
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -154,6 +156,13 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int 
             pad = " " * (widths[i] - _width(cell))
             cells.append(pad + cell if i in right else cell + pad)
         click.echo((" " * indent + "  ".join(cells)).rstrip())
+
+
+def wrapped(text: str, indent: str = "  ") -> None:
+    """Print a paragraph, within the terminal's width; 110 columns when piped."""
+    width = min(110, shutil.get_terminal_size().columns) if sys.stdout.isatty() else 110
+    rest = " " * len(indent)
+    click.echo(textwrap.fill(text, width, initial_indent=indent, subsequent_indent=rest, break_long_words=False))
 
 
 def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, right: Sequence[int]) -> None:

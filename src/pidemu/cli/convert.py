@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from pidemu.cli.common import (
     split_options,
     table,
     vendors_option,
+    wrapped,
 )
 from pidemu.conversion.certificate import EXACT, Band, Certificate, PathComparison
 from pidemu.conversion.convert import MATCHES, Conversion, convert
@@ -153,7 +153,7 @@ def _print(c: Conversion, round_dials: bool) -> None:
     _list("These settings rest on what nobody says", c.law_assumptions)
     others = len(c.assumptions) - len(c.law_assumptions)
     if others:
-        _wrap(
+        wrapped(
             f"{others} more assumptions concern scan rules, limits and transfers: 'pidemu show' and --json list them.",
             "  ",
         )
@@ -261,7 +261,7 @@ def _rounding(conversion: Conversion, asked: bool) -> None:
 def _textbook(c: Conversion) -> None:
     book = c.textbook
     if book.certificate is None:
-        _wrap(f"the textbook rule has no answer: {book.reason}", "  ")
+        wrapped(f"the textbook rule has no answer: {book.reason}", "  ")
     elif c.match != "textbook" and book.certificate.feedback.loop_band.max_deviation < EXACT:
         click.echo("  the textbook rule gives the same law for measurement")
     elif c.match != "textbook":
@@ -275,8 +275,4 @@ def _list(title: str, items: tuple[str, ...]) -> None:
     if items:
         heading(f"\n{title}")
         for item in items:
-            _wrap(item, "  - ")
-
-
-def _wrap(text: str, indent: str) -> None:
-    click.echo(textwrap.fill(text, 110, initial_indent=indent, subsequent_indent=" " * len(indent), break_long_words=False))
+            wrapped(item, "  - ")

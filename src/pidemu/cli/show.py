@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import click
 
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Setting
 from pidemu.card.text import equation_lines
-from pidemu.cli.common import assignments, find, heading, json_option, number, print_json, table, vendors_option
+from pidemu.cli.common import assignments, find, heading, json_option, number, print_json, table, vendors_option, wrapped
 from pidemu.plain import json_safe
 from pidemu.settings import is_active, off_values
 
@@ -28,7 +26,7 @@ def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_js
         return
     heading(f"{found.id}   {found.title}")
     if found.data.about:
-        _wrapped(found.data.about)
+        wrapped(found.data.about)
     _options(found, variant)
     heading("\nEquation (continuous, reverse acting)")
     for line in equation_lines(variant):
@@ -37,10 +35,6 @@ def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_js
     _settings(variant)
     _evidence(variant)
     _rest(found)
-
-
-def _wrapped(text: str, indent: str = "  ") -> None:
-    click.echo(textwrap.fill(text, 110, initial_indent=indent, subsequent_indent=" " * len(indent)))
 
 
 def _options(card: Card, variant: Variant) -> None:
@@ -111,25 +105,25 @@ def _evidence(variant: Variant) -> None:
     if assumed:
         heading("\nAssumed - nobody says so, and results rest on it")
         for a in assumed:
-            _wrapped(str(a), "  - ")
+            wrapped(str(a), "  - ")
 
 
 def _rest(card: Card) -> None:
     heading("\nSources")
     for key, s in card.data.sources.items():
-        _wrapped(
+        wrapped(
             f"[{key}] {s.title}" + (f", {s.address}" if s.address else "") + f" (read {s.read})" + (f". {s.note}" if s.note else "")
         )
     if card.data.quirks:
         heading("\nQuirks")
         for quirk in card.data.quirks:
-            _wrapped(quirk.text + (f" [{quirk.source}]" if quirk.source else ""), "  - ")
+            wrapped(quirk.text + (f" [{quirk.source}]" if quirk.source else ""), "  - ")
     heading("\nExamples")
     for example in card.data.examples:
         given = ", ".join(f"{k}={v if isinstance(v, str) else number(v)}" for k, v in example.given.items())
         c = example.canonical
         gains = f"kp {number(c.kp)}, ki {number(c.ki)} 1/s, kd {number(c.kd)} s" + (f", Tf {number(c.Tf)} s" if c.Tf else "")
-        _wrapped(f"{given}: {gains}" + (f" [{example.source}]" if example.source else ""), "  - ")
+        wrapped(f"{given}: {gains}" + (f" [{example.source}]" if example.source else ""), "  - ")
 
 
 def _plain(variant: Variant) -> dict[str, object]:
