@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from numbers import Real
-from typing import Any, Final
+from typing import Final
 
-from pidemu.card.load import Card, Variant
+from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.models import Form, Setting
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.settings import RESERVED, Settings, Value, is_active, limits, off_values, spans_of
@@ -21,7 +21,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     given = dict(given)
     _refuse_twice(card, given)
     pv_range, op_range = (_range(card, name, given.pop(name, None)) for name in RESERVED)
-    options = {k: v for k, v in given.items() if _known(k, card.data.options)}
+    options = {k: v for k, v in given.items() if match_name(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
     notes: list[str] = []
     implied = _implied(card, options, dials, notes)
@@ -31,7 +31,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     spans = spans_of(pv_range, op_range)
     values: dict[str, Value] = {}
     faults: list[str] = []
-    names = {_known(k, variant.equation.settings) or k: v for k, v in dials.items()}
+    names = {match_name(k, variant.equation.settings) or k: v for k, v in dials.items()}
     unknown = [name for name in names if name not in variant.equation.settings]
     faults += [_unknown(card, variant, name) for name in unknown]
     misspelt = " ".join(faults)
@@ -63,13 +63,6 @@ def _refuse_twice(card: Card, given: Mapping[str, object]) -> None:
             raise SettingError(f"{card.id}: {first} and {name} are the same setting; give it once")
 
 
-def _known(name: str, known: Mapping[str, Any]) -> str | None:
-    if name in known:
-        return name
-    folded = [k for k in known if k.casefold() == name.casefold()]
-    return folded[0] if len(folded) == 1 else None
-
-
 def _unknown(card: Card, variant: Variant, name: str) -> str:
     everything = [*card.all_settings(), *card.data.options]
     if name in everything:
@@ -81,12 +74,12 @@ def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, obje
     """Choose an option nobody gave where the dials named exist under one of its choices only."""
     chosen = dict(options)
     for name, option in card.data.options.items():
-        if _known(name, options) or any(k.casefold() == name.casefold() for k in options):
+        if match_name(name, options):
             continue
         fits = [
             choice
             for choice in card.options[name]
-            if all(_known(d, card.variant({**chosen, name: choice}).equation.settings) for d in dials)
+            if all(match_name(d, card.variant({**chosen, name: choice}).equation.settings) for d in dials)
         ]
         if len(fits) > 1 and option.default not in fits:
             raise SettingError(f"{card.id}: {', '.join(dials)} go with {name}={' or '.join(fits)}; say which")

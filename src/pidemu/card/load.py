@@ -243,12 +243,12 @@ class Card:
         """
         chosen = {name: o.default for name, o in self.data.options.items()}
         for given, choice in (options or {}).items():
-            name = _match(given, chosen)
+            name = match_name(given, chosen)
             if name is None:
                 known = ", ".join(chosen) or "none"
                 raise SettingError(f"{self.id}: unknown option '{given}'{suggest(given, chosen)}; options: {known}")
             choices = self.data.options[name].choices
-            word = _match(str(choice), choices)
+            word = match_name(str(choice), choices)
             if word is None:
                 raise SettingError(
                     f"{self.id}: option {name} has no choice '{choice}'{suggest(str(choice), choices)}; "
@@ -309,7 +309,8 @@ def _usual_place(dial: tuple[str, Any]) -> int:
     return DIAL_ORDER.index(role) if role in DIAL_ORDER else len(DIAL_ORDER)
 
 
-def _match(word: str, known: Mapping[str, Any]) -> str | None:
+def match_name(word: str, known: Mapping[str, Any]) -> str | None:
+    """Return the known name that `word` spells, in upper or lower case where that is unambiguous."""
     if word in known:
         return word
     folded = [k for k in known if k.casefold() == word.casefold()]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from pidemu.cli.common import action_option, assignments, find, limits_option, vendors_option
+from pidemu.card.library import load_card
+from pidemu.cli.common import action_option, assignments, limits_option, vendors_option
 from pidemu.emulator import Controller
 
 
@@ -28,6 +29,6 @@ def command(
     """Print what CARD with the settings NAME=VALUE does in one scan, as a module that runs on its own."""
     from pidemu.targets.python import source
 
-    settings = find(card, vendors).settings(assignments(values))
+    settings = load_card(card, vendors).settings(assignments(values))
     controller = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits)
     click.echo(source(controller.program), nl=False)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.errors import SettingError
 
@@ -107,11 +106,6 @@ def split_options(card: Card, given: Mapping[str, object]) -> tuple[dict[str, ob
     options = {o.casefold() for o in card.options}
     chosen = {k: v for k, v in given.items() if k.casefold() in options}
     return chosen, {k: v for k, v in given.items() if k not in chosen}
-
-
-def find(name: str, vendors: Sequence[str]) -> Card:
-    """Return a card by id or file."""
-    return load_card(name, vendors)
 
 
 def number(x: float) -> str:

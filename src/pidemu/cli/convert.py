@@ -7,12 +7,12 @@ from typing import Any
 
 import click
 
+from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.common import (
     Pair,
     Scan,
     assignments,
-    find,
     heading,
     json_option,
     number,
@@ -100,8 +100,8 @@ def command(
     if target is None:
         raise click.UsageError("no card to convert to; add --to CARD, 'pidemu cards' lists them")
     ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
-    source = find(card, vendors).settings({**given, **ranges})
-    goal = find(target, vendors)
+    source = load_card(card, vendors).settings({**given, **ranges})
+    goal = load_card(target, vendors)
     options, dials = split_options(goal, wanted)
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "match": match, "round_dials": round_dials,

@@ -9,7 +9,8 @@ from pathlib import Path
 import click
 import numpy as np
 
-from pidemu.cli.common import action_option, assignments, find, limits_option, number, vendors_option
+from pidemu.card.library import load_card
+from pidemu.cli.common import action_option, assignments, limits_option, number, vendors_option
 from pidemu.emulator import Controller, Floats
 from pidemu.errors import RecordError, ScanError
 from pidemu.records import Record, interval, read_record, write_record
@@ -59,7 +60,7 @@ def command(
 
     Where the file has a recorded output, the largest difference is stated. Without --scan the interval is that of a time column.
     """
-    settings = find(card, vendors).settings(assignments(values))
+    settings = load_card(card, vendors).settings(assignments(values))
     record = read_record(file)
     step = interval(record, file, scan)
     start = _initial(record) if initial_output is None else initial_output

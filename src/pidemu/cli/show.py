@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import click
 
+from pidemu.card.library import load_card
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Setting
 from pidemu.card.text import equation_lines
-from pidemu.cli.common import assignments, find, heading, json_option, number, print_json, table, vendors_option, wrapped
+from pidemu.cli.common import assignments, heading, json_option, number, print_json, table, vendors_option, wrapped
 from pidemu.plain import json_safe
 from pidemu.settings import is_active, off_values
 
@@ -19,7 +20,7 @@ from pidemu.settings import is_active, off_values
 @json_option
 def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> None:
     """Show CARD (an id such as fisher/provox, or a file) with the options chosen: equation, settings, evidence, what is assumed."""
-    found = find(card, vendors)
+    found = load_card(card, vendors)
     variant = found.variant(assignments(options, "OPTION=CHOICE", "FORM=Series"))
     if as_json:
         print_json(_plain(variant))

@@ -211,13 +211,20 @@ def convert(
 
     work = solver(chosen)
     settings, how, refusal = work.solve(match)
-    present = None if settings is None or refusal else work.certify(settings)
-    better = better_options(card, chosen, present, solver) if match in (None, "exact") else None
+    certificate = None if settings is None else work.certify(settings)
+    better = better_options(card, chosen, None if refusal else certificate, solver) if match in (None, "exact") else None
     if refusal and better is not None:
         refusal = f"{refusal}; other options would do: {better}"
-    if settings is None:
+    if settings is None or certificate is None:
         raise ConversionRefusedError(refusal)
-    conversion = _conversion(work, settings, how, refusal, None if refusal else better, round_dials=round_dials)
+    if round_dials:
+        settings, rounded = _rounded(settings)
+        before = certificate.feedback if rounded else None
+        certificate = replace(work.certify(settings), dials=rounded, feedback_before_rounding=before)
+    better = None if refusal else better
+    book = _textbook(work)
+    conversion = Conversion(source, settings, how, certificate, book, (), refusal, better, work.factor, scans)
+    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)
     return conversion
@@ -255,23 +262,13 @@ def _shared(source: Settings, target: Card) -> dict[str, object]:
     return {n: v.value for n, v in source.items() if v.active and (v.role is Role.MULTIPLIER or v.setting.scope == "module")}
 
 
-def _conversion(
-    solver: Solver, settings: Settings, how: Match, refusal: str, better: str | None, *, round_dials: bool
-) -> Conversion:
-    """Certify, round if asked, and say what differs."""
-    certificate = solver.certify(settings)
-    if round_dials:
-        rounded, dials = _rounded(settings)
-        before = certificate.feedback if dials else None
-        certificate = replace(solver.certify(rounded), dials=dials, feedback_before_rounding=before)
-        settings = rounded
+def _textbook(solver: Solver) -> Textbook:
+    """Return what the textbook rule gives, with its figures."""
     try:
         book = solver.textbook()
-        textbook = Textbook(book, solver.certify(book))
+        return Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
-        textbook = Textbook(None, None, str(error))
-    conversion = Conversion(solver.source, settings, how, certificate, textbook, (), refusal, better, solver.factor, solver.scans)
-    return replace(conversion, warnings=tuple(warnings_for(conversion)))
+        return Textbook(None, None, str(error))
 
 
 def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float, float] | None) -> float:

@@ -90,11 +90,12 @@ class Solver:
             The rule has no answer, or the target no such settings.
         """
         closed.check_terms(self.scaled.algorithm, self.target)
-        a, kd = self.scaled.algorithm, self.scaled.algorithm.kd
-        time = self.source.by_role(Role.DERIVATIVE)
-        if a.series and kd and time is not None:
-            kd = a.kp * time.canonical  # the dial's own time, not the strength left by a lead-lag
-        return self.target.settings(closed.textbook(a, kd, self.target))
+        return self.target.settings(closed.textbook(self.scaled.algorithm, self._dial_kd(), self.target))
+
+    def _dial_kd(self) -> float:
+        """Return ``K Td`` by the source's dial: its own time, not the strength left by a lead-lag [s]."""
+        a, time = self.scaled.algorithm, self.source.by_role(Role.DERIVATIVE)
+        return a.kp * time.canonical if a.series and a.kd and time is not None else a.kd
 
     def closed(self, match: str | None) -> tuple[Settings, Match]:
         """Return the target's settings by a closed form, and which.
@@ -117,13 +118,12 @@ class Solver:
     def _own(self) -> tuple[str, Settings] | None:
         """Return verdict and settings for the source's own numbers, where these are an exact match of a target of its form."""
         equation, a = self.source.equation, self.scaled.algorithm
-        gain, time = self.source.by_role(Role.GAIN), self.source.by_role(Role.DERIVATIVE)
+        gain = self.source.by_role(Role.GAIN)
         if equation.form is not self.target.form:
             return None
         K = a.kp or (gain.canonical if gain is not None else 0.0)
-        kd = a.kp * time.canonical if a.series and a.kd and time is not None else a.kd
         with suppress(SettingError):
-            settings = self._weighted(Numbers(K, a.ki, kd, a.Tf if self.target.filter.free else None))
+            settings = self._weighted(Numbers(K, a.ki, self._dial_kd(), a.Tf if self.target.filter.free else None))
             verdict = self.certify(settings).verdict
             return None if verdict == "approximate" else (verdict, settings)
         return None

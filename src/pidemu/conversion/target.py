@@ -12,8 +12,8 @@ from pidemu.algorithm import Algorithm
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Form, Setting
 from pidemu.errors import SettingError
-from pidemu.settings import Settings, is_active, limits, off_values
-from pidemu.units import Role, Spans, from_canonical, parse_unit, to_canonical
+from pidemu.settings import Settings, is_active, limits, off_values, spans_of
+from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
 FilterKind = Literal["none", "time", "ratio", "gain"]
 
@@ -131,7 +131,7 @@ class Target:
         self.options = dict(options)
         self.given = dict(given)
         self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
-        self.spans = Spans(*(r[1] - r[0] if r else 100.0 for r in (pv_range, op_range)))
+        self.spans = spans_of(pv_range, op_range)
         self.form = self.variant.equation.form
         self.idle_gain = 1.0
         """Gain taken where there is no proportional term, so that the gain only scales the two times."""

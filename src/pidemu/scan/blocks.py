@@ -5,6 +5,9 @@ A block gets the `Builder` and the expressions it works on, adds its coefficient
 
 from __future__ import annotations
 
+import functools
+import operator
+from collections.abc import Sequence
 from typing import Final
 
 from pidemu.card.models import Rule
@@ -13,6 +16,7 @@ from pidemu.scan.program import Assign, Expr, Name, Operand, Program, Quantity, 
 TINY: Final = 1e-300
 """States smaller than this are set to zero: denormal numbers make a scan many times slower (specs/equations.md, section 7)."""
 
+_AGO: Final = {1: "at the last scan", 2: "two scans ago"}
 INPUTS: Final = (
     Quantity("sp", "setpoint", "%"),
     Quantity("pv", "measurement", "%"),
@@ -77,45 +81,27 @@ def lag(b: Builder, x: Expr, afresh: Expr, Tf: float, h: float, rule: Rule, orde
 
     The order is the card's. The second-order one is ``1/(1 + Tf s + Tf^2 s^2/2)``.
     """
-    first = b.state(f"{what}1", f"{what}, filtered, at the last scan", "%")
-    inputs = _input_weights(rule, Tf, h, order)
-    poles = _pole_weights(rule, Tf, h, order)
-    second = b.state(f"{what}2", f"{what}, filtered, two scans ago", "%") if order == 2 else None
+    inputs, poles = _weights(rule, Tf, h, order)
     text = f"filter on the {what}, Tf = {Tf:.6g} s, {rule.value} (section 4)"
-    needs_input = len(inputs) > 1 and any(inputs[1:])
-    x1 = b.state(f"{what}_in1", f"{what}, unfiltered, at the last scan", "%") if needs_input else None
-    x2 = b.state(f"{what}_in2", f"{what}, unfiltered, two scans ago", "%") if needs_input and order == 2 else None
-    history = [(first, x), (second, x), (x1, x), (x2, x)]
-    for state, value in history:
-        if state is not None:
-            b.let(state.id, select(afresh, value, state), "start in the steady state of the first sample")
-    total: Expr | None = None
-    for name, weight, signal in [
-        (f"{what}_g0", inputs[0], x),
-        (f"{what}_g1", inputs[1] if len(inputs) > 1 else 0.0, x1),
-        (f"{what}_g2", inputs[2] if len(inputs) > 2 else 0.0, x2),
-        (f"{what}_a1", poles[0], first),
-        (f"{what}_a2", poles[1] if len(poles) > 1 else 0.0, second),
-    ]:
-        if signal is None or weight == 0:
-            continue
-        part = b.coefficient(name, weight, f"weight in the filter on the {what}", "-") * signal
-        total = part if total is None else total + part
-    assert total is not None
-    result = b.let(f"{what}_f", flushed_sum(b, total, f"{what}_f"), text)
-    if second is not None:
-        b.let(second.id, first, "shift the filter's history")
-    b.let(first.id, result, "shift the filter's history")
-    if x2 is not None and x1 is not None:
-        b.let(x2.id, x1, "shift the filter's history")
-    if x1 is not None:
-        b.let(x1.id, x, "shift the filter's history")
+    old = [b.state(f"{what}{n}", f"{what}, filtered, {_AGO[n]}") for n in range(1, order + 1)]
+    signals = [b.state(f"{what}_in{n}", f"{what}, unfiltered, {_AGO[n]}") for n in range(1, order + 1) if any(inputs[1:])]
+    for state in (*old, *signals):
+        b.let(state.id, select(afresh, x, state), "start in the steady state of the first sample")
+    weighted = [(f"{what}_g{n}", inputs[n], signal) for n, signal in enumerate([x, *signals])]
+    weighted += [(f"{what}_a{n}", poles[n - 1], state) for n, state in enumerate(old, 1)]
+    words = f"weight in the filter on the {what}"
+    total = summed([b.coefficient(name, weight, words, "-") * signal for name, weight, signal in weighted if weight])
+    result = b.let(f"{what}_f", flushed(b.let(f"{what}_f", total, "weighted sum")), text)
+    for line, newest in ((old, result), (signals, x)):
+        for n in reversed(range(len(line))):
+            b.let(line[n].id, line[n - 1] if n else newest, "shift the filter's history")
     return result
 
 
-def flushed_sum(b: Builder, total: Expr, name: str) -> Expr:
-    """Name a sum, so that it is computed once, and flush it."""
-    return flushed(b.let(name, total, "weighted sum"))
+def summed(parts: Sequence[Expr | None]) -> Expr:
+    """Return the sum of the parts that there are, from the left; there is at least one."""
+    first, *others = (part for part in parts if part is not None)
+    return functools.reduce(operator.add, others, first)
 
 
 def _bilinear(rule: Rule, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -143,14 +129,10 @@ def _denominator(rule: Rule, Tf: float, h: float, order: int) -> tuple[tuple[flo
     return top, bottom
 
 
-def _input_weights(rule: Rule, Tf: float, h: float, order: int) -> tuple[float, ...]:
+def _weights(rule: Rule, Tf: float, h: float, order: int) -> tuple[list[float], list[float]]:
+    """Return the weights of the input and of the filtered past."""
     top, bottom = _denominator(rule, Tf, h, order)
-    return tuple(x / bottom[0] for x in top)
-
-
-def _pole_weights(rule: Rule, Tf: float, h: float, order: int) -> tuple[float, ...]:
-    _, bottom = _denominator(rule, Tf, h, order)
-    return tuple(-x / bottom[0] for x in bottom[1:])
+    return [x / bottom[0] for x in top], [-x / bottom[0] for x in bottom[1:]]
 
 
 def derivative(b: Builder, x: Expr, afresh: Expr, gain: float, Tf: float, h: float, rule: Rule) -> Name:

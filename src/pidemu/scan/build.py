@@ -144,13 +144,11 @@ def _proportional(b: Builder, a: Algorithm, e: Expr, sp: Expr, y: Expr) -> Expr:
     return b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%") * _difference(b, a.b, "b", e, sp, y)
 
 
-def _sum(parts: list[Expr | None]) -> Expr:
-    total: Expr | None = None
-    for part in parts:
-        if part is not None:
-            total = part if total is None else total + part
-    assert total is not None
-    return total
+def _lagged(b: Builder, a: Algorithm, h: float, x: Expr, what: str) -> Expr:
+    """Return the output, or its increment, behind the filter if there is one; it starts afresh at a transfer."""
+    if not (a.has_signal_filter and a.filter_on == "output"):
+        return x
+    return blocks.lag(b, x, equal(Name("on"), 0.0), a.Tf, h, a.filter_rule, a.filter_order, what)
 
 
 def _positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Expr:
@@ -169,18 +167,8 @@ def _positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Ex
         I = _start_and_grow(b, a, t, P, state, grown, moved)  # noqa: E741
     elif bias:
         I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
-    v: Expr = b.let("v", _sum([P, I, t.D]), "sum of the terms")
-    if a.has_signal_filter and a.filter_on == "output":
-        v = blocks.lag(
-            b,
-            v,
-            equal(b.state("on", "automatic in the last scan", "-"), 0.0),
-            a.Tf,
-            h,
-            a.filter_rule,
-            a.filter_order,
-            "v",
-        )
+    v: Expr = b.let("v", blocks.summed([P, I, t.D]), "sum of the terms")
+    v = _lagged(b, a, h, v, "v")
     out = b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")
     if holds_sum and a.ki:
         _after_output(b, a, h, v, out, grown)
@@ -210,7 +198,7 @@ def _gated(b: Builder, a: Algorithm, t: Terms, P: Expr, state: Name, grown: Expr
             "dI", select(stop, 0.0, grown), "freeze: none that pushes further while the last output is at a limit (section 5)"
         )
     ahead = [P, state, None if a.integral_rule is Rule.FORWARD else grown, t.D]
-    v0 = b.let("v0", _sum(ahead), "sum with this increment")
+    v0 = b.let("v0", blocks.summed(ahead), "sum with this increment")
     stop = blocks.saturated(v0, t.low, t.high, grown)
     return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")
 
@@ -264,18 +252,8 @@ def _velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
         D1 = b.state("D1", "derivative term at the last scan")
         parts.append(b.let("dD", t.D - D1, "increment of the derivative term"))
         b.let("D1", t.D, "kept for the next scan")
-    moved = _sum(parts) if parts else 0.0
+    moved = blocks.summed(parts) if parts else 0.0
     du: Expr = b.let("du", select(t.on, moved, 0.0), "increment; none at a transfer, bumpless (section 6)")
-    if a.has_signal_filter and a.filter_on == "output":
-        du = blocks.lag(
-            b,
-            du,
-            equal(b.state("on", "automatic in the last scan", "-"), 0.0),
-            a.Tf,
-            h,
-            a.filter_rule,
-            a.filter_order,
-            "du",
-        )
+    du = _lagged(b, a, h, du, "du")
     v = b.let("v", t.u + du, "last output and increment")
     return b.let("out", blocks.limited(v, t.low, t.high), "output limits (section 5)")
