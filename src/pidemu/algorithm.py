@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,7 +10,117 @@ from pidemu.card.models import Rule
 from pidemu.errors import ScanError
 
 Place = Literal["term", "measurement", "output"]
-Scheme = Literal["none", "clamp", "clamp-sum", "freeze", "conditional", "back-calculation", "external-reset", "velocity"]
+Scheme = Literal[
+    "none", "clamp", "clamp-sum", "freeze", "conditional", "recompute", "back-calculation", "external-reset", "velocity",
+    "reset-outside-band",
+]  # fmt: skip
+Start = Literal["bumpless", "load-output", "tracked", "keep", "zero", "running"]
+
+
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """A first-order filter on setpoint, measurement or error (specs/equations.md, section 4).
+
+    Attributes
+    ----------
+    time : float
+        Filter time at the card's own scan interval [s].
+    factor : float
+        Share of the new sample per scan, where that is what the card sets; 1: it sets the time.
+    rule : Rule
+        Scan rule.
+    """
+
+    time: float
+    factor: float = 1.0
+    rule: Rule = Rule.BACKWARD
+
+    def at(self, h: float) -> float:
+        """Return the filter time at a scan interval `h` [s]."""
+        return h * (1 - self.factor) / self.factor if self.factor != 1 else self.time
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What is done to the error before P and I use it (specs/equations.md, section 8).
+
+    Attributes
+    ----------
+    kind : {"gap", "squared", "gain-linear"}
+        Which.
+    band : float
+        Half width of the gap [%].
+    gain : float
+        Gain within the gap; 0: a deadband.
+    subtracted, zero_crossing : bool
+        Whether the error is continuous at the edge; whether the gap waits for a change of sign.
+    linearity : float
+        ``L`` of gain-linear.
+    over : float
+        The error at which squared and gain-linear have gain 1 [%].
+    on : {"error", "proportional", "integral"}
+        Which terms' error.
+    """
+
+    kind: Literal["gap", "squared", "gain-linear"]
+    band: float = 0.0
+    gain: float = 0.0
+    subtracted: bool = False
+    zero_crossing: bool = False
+    linearity: float = 1.0
+    over: float = 100.0
+    on: Literal["error", "proportional", "integral"] = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """The fine print of a windup scheme (specs/equations.md, section 5).
+
+    Attributes
+    ----------
+    without_derivative : bool
+        The limits are held against ``P + I``.
+    both : bool
+        `freeze` stops the integral whichever way it would move.
+    by_output_sign : bool
+        `conditional` judges by the sign of error times output.
+    fast_return : float
+        Factor on an increment that leads back from a limit.
+    clamped : bool
+        `recompute` limits the integral to the output limits as well.
+    """
+
+    without_derivative: bool = False
+    both: bool = False
+    by_output_sign: bool = False
+    fast_return: float = 1.0
+    clamped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Dahlin:
+    """A pole-cancellation algorithm's process and wish (specs/equations.md, section 4).
+
+    Attributes
+    ----------
+    gain : float
+        Process gain [%/%].
+    time, delay : float
+        Process time constant and dead time [s].
+    wanted : float
+        Time constant of the closed loop [s].
+    """
+
+    gain: float
+    time: float
+    delay: float
+    wanted: float
+
+    def numbers(self, h: float) -> tuple[float, float, float, int]:
+        """Return ``g``, ``p``, ``q`` and ``N`` of ``u_n = q u_(n-1) + (1-q) u_(n-N-1) + g (e_n - p e_(n-1))`` at interval `h` [s]."""
+        q = math.exp(-h / self.wanted) if self.wanted else 0.0
+        p = math.exp(-h / self.time) if self.time else 0.0
+        return (1 - q) / (self.gain * (1 - p)), p, q, round(self.delay / h)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +155,66 @@ class Algorithm:
         Scan rules.
     windup : str
         Windup scheme (specs/equations.md, section 5).
+    gate : Gate
+        Its fine print.
     tracking_time : float
         Tracking time of back-calculation [s].
     accumulated : bool
         P on PV is accumulated from its value at the start.
-    load_output : bool
-        At the transfer to automatic the integral sum is loaded with the output, and the terms come on top.
-    restarted : bool
-        Filters and differences start afresh at the transfer.
+    start : str
+        What the integral does at the transfer to automatic (specs/equations.md, section 6).
+    keeps_load : bool
+        With ``start="load-output"`` and no integral action, the sum keeps what it was loaded with.
+    first_scan_holds : bool
+        The integral does not grow in the first automatic scan.
+    loads_as_it_is : bool
+        With ``start="load-output"``: the output is not limited before it is loaded.
+    zero_power_up : bool
+        The integral begins at zero at the very first scan.
+    derivative_start : {"running", "restarted", "zeroed", "preset"}
+        What filters and differences do at the transfer.
+    derivative_from_zero : bool
+        At the very first scan the previous signal of the derivative is zero.
+    manual_output : {"operator", "gain-times-operator", "zero"}
+        The output in manual.
+    gain_sign : float
+        -1 where the vendor's gain has the opposite sign of `kp`.
+    bumpless_changes : bool
+        A setting changed in automatic does not move the output.
+    holds : {"ki e", "e/Ti", "e"}
+        What the integral's state is the integral of.
+    integral_limits : tuple of float or None, optional
+        Limits of that state; ``None`` stands for the output's own limit.
+    integral_deadband : float, optional
+        No integration while the error is at most this [%].
+    sp_filter, pv_filter, e_filter : Lag, optional
+        Filters before the algorithm.
+    previous_pv : bool
+        The measurement of the previous scan is used.
+    sp_rate : float
+        Fastest change of the setpoint [%/s].
+    sp_from_zero, sp_tracks : bool
+        The limited setpoint starts at zero; the setpoint follows the measurement in manual.
+    shape : Shape, optional
+        What is done to the error.
+    cascade_b : float, optional
+        Setpoint weight of P in cascade, where it is another one.
+    feedforward : float, optional
+        Gain of the feedforward signal, where there is one.
+    feedforward_after : bool
+        It is added to the limited output.
+    bias : float
+        Output at zero error without integral [%], from a setting.
+    output_rate, output_deadband, resolution : float
+        Output rate limit [%/s], deadband [%] and step [%]; infinity and zero: none.
+    precision : {"float64", "float32", "integer"}
+        Arithmetic (specs/equations.md, section 7).
+    wide_literals : bool
+        With float32: literals are float64.
+    counts, gain_counts : int
+        With integers: counts per percent and per unit of gain.
+    dahlin : Dahlin, optional
+        The pole-cancellation algorithm in place of all terms.
     """
 
     series: bool
@@ -68,10 +231,42 @@ class Algorithm:
     derivative_rule: Rule = Rule.BACKWARD
     filter_rule: Rule = Rule.BACKWARD
     windup: Scheme = "none"
+    gate: Gate = Gate()
     tracking_time: float = 0.0
     accumulated: bool = False
-    load_output: bool = False
-    restarted: bool = False
+    start: Start = "bumpless"
+    keeps_load: bool = True
+    first_scan_holds: bool = False
+    loads_as_it_is: bool = False
+    zero_power_up: bool = False
+    derivative_start: Literal["running", "restarted", "zeroed", "preset"] = "running"
+    derivative_from_zero: bool = False
+    manual_output: Literal["operator", "gain-times-operator", "zero"] = "operator"
+    gain_sign: float = 1.0
+    bumpless_changes: bool = False
+    holds: Literal["ki e", "e/Ti", "e"] = "ki e"
+    integral_limits: tuple[float | None, float | None] | None = None
+    integral_deadband: float | None = None
+    sp_filter: Lag | None = None
+    pv_filter: Lag | None = None
+    e_filter: Lag | None = None
+    previous_pv: bool = False
+    sp_rate: float = math.inf
+    sp_from_zero: bool = False
+    sp_tracks: bool = False
+    shape: Shape | None = None
+    cascade_b: float | None = None
+    feedforward: float | None = None
+    feedforward_after: bool = False
+    bias: float = 0.0
+    output_rate: float = math.inf
+    output_deadband: float = 0.0
+    resolution: float = 0.0
+    precision: Literal["float64", "float32", "integer"] = "float64"
+    wide_literals: bool = False
+    counts: int = 1
+    gain_counts: int = 1
+    dahlin: Dahlin | None = None
 
     @property
     def has_term_filter(self) -> bool:
@@ -89,19 +284,49 @@ class Algorithm:
         none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
         return 0.0 if none else self.kd / self.kp
 
+    @property
+    def beyond_the_law(self) -> list[str]:
+        """What the linear law leaves out, in words: everything at work that is not linear."""
+        found = []
+        if self.shape is not None:
+            band = f" of {self.shape.band:g}" if self.shape.kind == "gap" else ""
+            name = "deadband" if self.shape.kind == "gap" and not self.shape.gain else self.shape.kind
+            found.append(f"error: {name}{band}")
+        if self.integral_deadband:
+            found.append(f"integral deadband of {self.integral_deadband:g}")
+        if math.isfinite(self.sp_rate):
+            found.append(f"setpoint rate limit of {self.sp_rate:g} per s")
+        if math.isfinite(self.output_rate):
+            found.append(f"output rate limit of {self.output_rate:g} per s")
+        if self.output_deadband:
+            found.append(f"output deadband of {self.output_deadband:g}")
+        if self.resolution:
+            found.append(f"output in steps of {self.resolution:g}")
+        if self.precision != "float64":
+            found.append(f"{self.precision} arithmetic")
+        return found
+
 
 def check_filters(a: Algorithm, h: float) -> None:
-    """Refuse a forward-rule filter that is unstable at a scan interval `h` [s].
+    """Refuse a derivative rule that does not fit the filter, and a forward-rule filter that is unstable at an interval `h` [s].
 
     Raises
     ------
     ScanError
-        The forward rule with ``0 < Tf <= h/2``, or with ``0 < Tf <= h`` for the second-order filter.
+        The forward rule with ``0 < Tf <= h/2``, or with ``0 < Tf <= h`` for the second-order filter; the lagged-difference rule without
+        a filter; the four-point rule with one.
     """
-    rules = [a.derivative_rule] if a.has_term_filter else [a.filter_rule] if a.has_signal_filter else []
+    if a.derivative_rule is Rule.LAGGED_DIFFERENCE and a.kd and not a.has_term_filter:
+        raise ScanError("the lagged-difference rule needs a filter on the derivative term")
+    if a.derivative_rule is Rule.FOUR_POINT and a.has_term_filter:
+        raise ScanError("the four-point rule is the filter; it goes with no other on the derivative term")
     share = 0.5 if a.filter_order == 1 else 1.0
-    if Rule.FORWARD in rules and a.Tf <= share * h:
-        raise ScanError(
-            f"the filter time {a.Tf:g} s is too short for the scan interval {h:g} s: the forward rule is unstable; "
-            f"use a scan interval below {a.Tf / share:g} s or no filter"
-        )
+    checked = [(lag.rule, lag.at(h), 0.5) for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
+    if a.has_term_filter or a.has_signal_filter:
+        checked.append((a.derivative_rule if a.has_term_filter else a.filter_rule, a.Tf, share))
+    for rule, Tf, least in checked:
+        if rule is Rule.FORWARD and 0 < Tf <= least * h:
+            raise ScanError(
+                f"the filter time {Tf:g} s is too short for the scan interval {h:g} s: the forward rule is unstable; "
+                f"use a scan interval below {Tf / least:g} s or no filter"
+            )

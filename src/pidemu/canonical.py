@@ -1,45 +1,70 @@
-"""A card's settings to an `Algorithm`: the numbers of its terms, filter and windup in canonical units."""
+"""A card's settings to an `Algorithm`: the numbers of its terms, filters, windup and stages in canonical units."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
-from pidemu.algorithm import Algorithm, Place
-from pidemu.card.models import Filter, Form, WindupBackCalculation
+from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
+from pidemu.card.models import (
+    Equation, ErrorShape, Filter, Form, IntegralLimits, Rule, SignalFilter, WindupBackCalculation, WindupExternalReset,
+    WindupGate, WindupRecompute,
+)  # fmt: skip
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
-from pidemu.units import Role, Spans, parse_unit, to_canonical
+from pidemu.units import Role, Spans, parse_quantity, parse_unit, to_canonical
 
 
-def _pick(settings: Settings, value: str | float | None, default: float) -> float:
-    """Return a number that a card gives itself, or by the name of a setting."""
-    if isinstance(value, str):
-        return settings[value].canonical
-    return default if value is None else value
+def default_scan(equation: Equation) -> float:
+    """Return the card's scan interval [s]."""
+    number, unit = parse_quantity(equation.scan.default)
+    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
 
 
-def algorithm_of(settings: Settings, *, own_units: bool = False) -> Algorithm:
+def gain_sign(equation: Equation) -> float:
+    """Return -1 where a positive gain is direct acting (`action.fixed` with ``pv - sp``), else 1."""
+    return -1.0 if equation.action.fixed and equation.action.reverse == "pv - sp" else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """Reads a card's dials and numbers in canonical units."""
+
+    settings: Settings
+    spans: Spans
+
+    def value(self, name: str) -> float:
+        """Return a dial's canonical value; 0 where it is off."""
+        value = self.settings[name]
+        return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self.spans)
+
+    def role(self, role: Role, default: float) -> float:
+        """Return the canonical value of the dial that sets `role`."""
+        value = self.settings.by_role(role)
+        return default if value is None else self.value(value.name)
+
+    def pick(self, given: str | float | None, default: float) -> float:
+        """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
+        if isinstance(given, str):
+            return default if self.settings[given].off else self.value(given)
+        return default if given is None else given
+
+
+def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
     equation = settings.equation
     engineering = equation.signals == "engineering"
-    spans = Spans() if own_units and engineering else settings.spans
-
-    def number(role: Role, default: float) -> float:
-        value = settings.by_role(role)
-        if value is None:
-            return default
-        if value.off:
-            return 0.0
-        return to_canonical(role, value.value, parse_unit(value.unit), spans)
-
-    gain = number(Role.GAIN, 0.0 if equation.form is Form.PARALLEL else 1.0)
-    scale = number(Role.MULTIPLIER, 1.0)
-    rate = number(Role.INTEGRAL, 0.0) if equation.integral.on != "none" else 0.0
-    time = number(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
-    if equation.form is Form.PARALLEL:
-        scale *= float(spans.ratio) if engineering else 1.0
-        kp = gain * number(Role.MULTIPLIER, 1.0)
+    read = _Reader(settings, Spans() if own_units and engineering else settings.spans)
+    form = equation.form
+    gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
+    scale = read.role(Role.MULTIPLIER, 1.0)
+    rate = read.role(Role.INTEGRAL, 0.0) if equation.integral.on != "none" else 0.0
+    time = read.role(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
+    if form is Form.PARALLEL:
+        kp = gain * scale
+        scale *= float(read.spans.ratio) if engineering else 1.0
+        scale *= gain_sign(equation)
         ki, kd = rate * scale, time * scale
     else:
         kp = gain * scale
@@ -47,24 +72,21 @@ def algorithm_of(settings: Settings, *, own_units: bool = False) -> Algorithm:
     filt = equation.derivative.filter
     if filt is not None and equation.derivative.on == "none" and filt.applies_to in ("term", "lead-lag"):
         filt = None  # it filters what is not there
-    Tf, place, order = _filter(settings, filt, rate, time)
+    Tf, place, order = _filter(read, filt, rate, time)
     if filt is not None and filt.applies_to == "lead-lag":
         kd -= kp * Tf
+    if equation.derivative.rule is Rule.LAGGED_DIFFERENCE and not Tf:
+        kd = 0.0  # there is no lag to take the difference from
     if equation.proportional.on == "none":
         kp = 0.0
-    if equation.form is Form.SERIES and kd and not kp:
-        raise UndefinedError(
-            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; "
-            f"change {settings.variant.choice_text}"
-        )
-    windup = equation.integral.windup
+    _refuse_undefined(settings, kp, kd)
     return Algorithm(
-        series=equation.form is Form.SERIES,
+        series=form is Form.SERIES,
         kp=kp,
         ki=ki,
         kd=kd,
-        b=_weight(settings, equation.proportional.on, equation.proportional.weight),
-        c=_weight(settings, equation.derivative.on, equation.derivative.weight),
+        b=_weight(read, equation.proportional.on, equation.proportional.weight),
+        c=_weight(read, equation.derivative.on, equation.derivative.weight),
         Tf=Tf,
         filter_on=place,
         filter_order=order,
@@ -72,47 +94,192 @@ def algorithm_of(settings: Settings, *, own_units: bool = False) -> Algorithm:
         integral_rule=equation.integral.rule,
         derivative_rule=equation.derivative.rule,
         filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
-        windup=windup.scheme,
-        tracking_time=_tracking(settings, rate, time, kp, ki, kd) if ki else 0.0,
+        windup=equation.integral.windup.scheme,
+        gate=_gate(equation),
+        tracking_time=_tracking(read, rate, time, kp, ki, kd) if ki else 0.0,
         accumulated=equation.proportional.accumulated,
-        load_output=equation.transfer.start == "load-output",
-        restarted=equation.transfer.derivative == "restarted",
+        gain_sign=gain_sign(equation),
+        holds=equation.integral.holds,
+        integral_limits=_integral_limits(read, equation.integral.limits),
+        integral_deadband=_some(read.pick(equation.integral.deadband, 0.0)) if equation.integral.deadband is not None else None,
+        bias=read.role(Role.BIAS, 0.0),
+        dahlin=_dahlin(read) if form is Form.DAHLIN else None,
+        **_transfer(equation),
+        **_signals(read, equation, default_scan(equation) if scan is None else scan),
+        **_output(read, equation),
     )
 
 
-def _weight(settings: Settings, on: str, weight: str | float | None) -> float:
-    return _pick(settings, weight, 1.0) if on == "weighted" else float(on == "error")
+def _refuse_undefined(settings: Settings, kp: float, kd: float) -> None:
+    equation = settings.equation
+    if equation.form is Form.SERIES and kd and not kp:
+        raise UndefinedError(
+            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; "
+            f"change {settings.variant.choice_text}"
+        )
+    if equation.integral.holds != "ki e" and equation.integral.on != "none" and not kp:
+        raise UndefinedError(f"{settings.card.id}: the gain multiplies all terms and is zero; give it another value")
 
 
-def _filter(settings: Settings, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
+def _some(value: float) -> float | None:
+    return value if value else None
+
+
+def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
+    if on != "weighted":
+        return float(on == "error")
+    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
+
+
+def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
     if filt is None:
         return 0.0, "term", 1
     place: Place = "term" if filt.applies_to == "lead-lag" else filt.applies_to
     if filt.time is not None:
-        return _pick(settings, filt.time, 0.0), place, filt.order
+        return read.pick(filt.time, 0.0), place, filt.order
     base = time / (1 + rate * time) if filt.of == "effective-derivative" else time
     if base == 0:
         return 0.0, place, filt.order
-    if isinstance(filt.gain, str) and settings[filt.gain].off:
+    if isinstance(filt.gain, str) and read.settings[filt.gain].off:
         return 0.0, place, filt.order
     if filt.gain is not None:
-        gain = _pick(settings, filt.gain, math.inf)
+        gain = read.pick(filt.gain, math.inf)
         if gain == 0:
             raise SettingError(
-                f"{settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative to zero"
+                f"{read.settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative to zero"
             )
         return base / gain, place, filt.order
-    return base * _pick(settings, filt.ratio, 0.0), place, filt.order
+    return base * read.pick(filt.ratio, 0.0), place, filt.order
 
 
-def _tracking(settings: Settings, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
+def _gate(equation: Equation) -> Gate:
+    match equation.integral.windup:
+        case WindupGate() as w:
+            return Gate(
+                without_derivative=w.judged_on == "sum-without-derivative",
+                both=w.direction == "both",
+                by_output_sign=w.test == "error-times-output",
+                fast_return=w.fast_return,
+            )
+        case WindupRecompute() as w:
+            return Gate(without_derivative=w.without_derivative, clamped=w.clamped)
+        case WindupExternalReset() as w:
+            return Gate(fast_return=w.fast_return)
+    return Gate()
+
+
+def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
     """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
-    parallel = settings.equation.form is Form.PARALLEL and kp != 0
-    integral_time, derivative_time = (kp / ki, kd / kp) if parallel else (1 / rate, time)
-    windup = settings.equation.integral.windup
-    given = windup.tracking_time if isinstance(windup, WindupBackCalculation) else "Ti"
-    if given == "Ti":
-        return abs(integral_time)
-    if given == "sqrt(Ti Td)":
-        return math.sqrt(abs(integral_time * derivative_time)) if derivative_time else abs(integral_time)
-    return _pick(settings, given, integral_time)
+    parallel = read.settings.equation.form is Form.PARALLEL
+    integral_time = abs(kp / ki if parallel and kp else 1 / rate)
+    both = abs(kd / ki) if parallel else abs(integral_time * time)  # Ti Td
+    known = {"Ti": integral_time, "sqrt(Ti Td)": math.sqrt(both) if both else integral_time}
+    windup = read.settings.equation.integral.windup
+    if not isinstance(windup, WindupBackCalculation):
+        return integral_time
+    given = windup.tracking_time
+    if isinstance(given, str) and given in known:
+        return known[given]
+    found = read.pick(given, 0.0)
+    if not found and windup.when_off is not None:
+        return known[windup.when_off]
+    return found * integral_time if windup.times == "Ti" else found
+
+
+def _integral_limits(read: _Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
+    if limits is None:
+        return None
+
+    def one(given: str | float | None) -> float | None:
+        return None if given == "output" else read.pick(given, math.inf)
+
+    high = one(limits.high)
+    if limits.low is not None:
+        low = one(limits.low)
+        return (-math.inf if isinstance(limits.low, str) and limits.low != "output" and low == math.inf else low), high
+    return None if high is None else -high, high
+
+
+def _transfer(equation: Equation) -> dict[str, Any]:
+    t = equation.transfer
+    return {
+        "start": t.start,
+        "keeps_load": t.without_integral == "kept",
+        "first_scan_holds": t.first_scan == "holds",
+        "loads_as_it_is": t.loaded == "as-it-is",
+        "zero_power_up": t.power_up == "zero",
+        "derivative_start": t.derivative,
+        "derivative_from_zero": equation.derivative.starts == "zero",
+        "manual_output": t.manual_output,
+        "bumpless_changes": t.changes == "bumpless",
+    }
+
+
+def _lag(read: _Reader, filt: SignalFilter | None, h: float) -> Lag | None:
+    """Return a signal's filter, or ``None`` where it is off."""
+    if filt is None:
+        return None
+    if filt.factor is None:
+        time = read.pick(filt.time, 0.0)
+        return Lag(time, 1.0, filt.rule) if time else None
+    factor = read.pick(filt.factor, 1.0)
+    return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
+
+
+def _shape(read: _Reader, error: ErrorShape | None) -> Shape | None:
+    if error is None or error.shape == "linear":
+        return None
+    band, linearity = read.pick(error.band, 0.0), read.pick(error.linearity, 1.0)
+    if (error.shape == "gap" and not band) or (error.shape == "gain-linear" and linearity == 1):
+        return None
+    gain = read.value(error.gain) if isinstance(error.gain, str) else error.gain
+    return Shape(error.shape, band, gain, error.subtracted, error.zero_crossing, linearity, error.over, error.on)
+
+
+def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
+    sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
+    cascade = equation.cascade and equation.cascade.proportional
+    b = _weight(read, equation.proportional.on, equation.proportional.weight)
+    other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
+    return {
+        "sp_filter": _lag(read, sp and sp.filter, h),
+        "sp_rate": read.pick(sp and sp.rate, math.inf),
+        "sp_from_zero": sp is not None and sp.starts == "zero",
+        "sp_tracks": sp is not None and sp.tracks,
+        "pv_filter": _lag(read, pv and pv.filter, h),
+        "previous_pv": pv is not None and pv.previous_scan,
+        "e_filter": _lag(read, error and error.filter, h),
+        "shape": _shape(read, error),
+        "cascade_b": None if other_b == b else other_b,
+        "feedforward": None if ff is None else read.pick(ff.gain, 0.0),
+        "feedforward_after": ff is not None and ff.summed == "after-limits",
+    }
+
+
+def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
+    arithmetic = equation.arithmetic
+    numbers: dict[str, Any] = {
+        "output_rate": read.pick(equation.output.rate, math.inf),
+        "output_deadband": read.pick(equation.output.deadband, 0.0),
+        "resolution": read.pick(equation.output.resolution, 0.0),
+    }
+    if arithmetic is not None:
+        numbers |= {
+            "precision": arithmetic.type,
+            "wide_literals": arithmetic.literals == "float64",
+            "counts": arithmetic.counts or 1,
+            "gain_counts": arithmetic.gain_counts or 1,
+        }
+    return numbers
+
+
+def _dahlin(read: _Reader) -> Dahlin:
+    found = Dahlin(
+        gain=read.role(Role.PROCESS_GAIN, 1.0),
+        time=read.role(Role.PROCESS_TIME, 0.0),
+        delay=read.role(Role.PROCESS_DELAY, 0.0),
+        wanted=read.role(Role.CLOSED_LOOP_TIME, 0.0),
+    )
+    if not found.gain:
+        raise SettingError(f"{read.settings.card.id}: a process gain of zero cannot be controlled; give the process's gain")
+    return found

@@ -2,31 +2,57 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.canonical import default_scan
+from pidemu.card.models import Faults
 from pidemu.errors import ScanError
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
-from pidemu.units import Role, parse_quantity, to_canonical
 
 if TYPE_CHECKING:
     from pidemu.targets.python import Compiled
 
 Engine = Literal["python"]
+Mode = Literal["power-up", "manual", "automatic", "cascade", "tracking", "hold"]
 Floats = npt.NDArray[np.float64]
 
+_MODES: Final[tuple[Mode, ...]] = ("manual", "automatic", "cascade", "tracking", "hold")
+_SIGNALS: Final = {"cascade": "cascade", "track": "track", "external_reset": "reset", "feedforward": "feedforward"}
+"""Name of the program's input by the name of the argument."""
+_REMEMBERED: Final = 64
+"""Programs kept for other scan intervals."""
 
-def default_scan(settings: Settings) -> float:
-    """Return the card's scan interval [s]."""
-    number, unit = parse_quantity(settings.equation.scan.default)
-    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened while a controller ran.
+
+    Attributes
+    ----------
+    scan : int
+        Which scan, counted from 0.
+    kind : {"transfer", "settings", "signal", "interval"}
+        A change of mode, of settings, a signal that is no number, or a scan interval that is none.
+    text : str
+        What happened.
+    bump : float
+        What the output moved by in this scan [as output limits]; for `settings`, how much further than without the change.
+    """
+
+    scan: int
+    kind: Literal["transfer", "settings", "signal", "interval"]
+    text: str
+    bump: float = 0.0
 
 
 def _pair(limits: Sequence[float]) -> tuple[float, float]:
@@ -48,7 +74,8 @@ class Controller:
         Scan interval [s]; by default the card's.
     action : {"reverse", "direct"}
         Control action in the ISA sense: reverse means that the output falls when the measurement rises. The card's own words are in
-        ``settings.equation.action.names``.
+        ``settings.equation.action.names``. Where the card has no such choice (``settings.equation.action.fixed``), the sign of the gain
+        decides, and this argument does nothing.
     output_limits : tuple of float, optional
         Low and high output limit [% of span; engineering units for a card with ``signals: engineering``]; by default the card's.
     bias : float
@@ -60,8 +87,14 @@ class Controller:
 
     Attributes
     ----------
+    settings : Settings
+        The settings in force.
+    interval : float
+        Nominal scan interval [s].
     program : Program
         The scan program.
+    events : list of Event
+        Changes of mode with their bumps, changes of settings, and what was wrong with signals and intervals.
 
     Raises
     ------
@@ -94,48 +127,179 @@ class Controller:
             names = settings.equation.action.names
             words = ", ".join(f"'{k}' ({v})" for k, v in names.items())
             raise ScanError(f"action is '{action}'; it is one of {words}")
-        self.settings = settings
-        self.interval = default_scan(settings) if scan is None else float(scan)
-        self.program: Program = build(
-            settings.algorithm(own_units=True),
-            self.interval,
-            action=action,
-            limits=_pair(settings.equation.output.limits if output_limits is None else output_limits),
-            bias=bias,
-            initial_output=initial_output,
-            title=f"{settings.summary}; scan {self.interval:g} s, {action} acting",
-        )
+        self.interval = default_scan(settings.equation) if scan is None else float(scan)
+        self.events: list[Event] = []
+        self._action: Action = "reverse" if settings.equation.action.fixed else action
+        self._limits = _pair(settings.equation.output.limits if output_limits is None else output_limits)
+        self._bias, self._initial_output = bias, initial_output
+        self._signals: tuple[str, ...] = ()
+        self._mode: Mode = "power-up"
+        self._count = 0
+        self._last: tuple[float, ...] = ()
+        self._use(settings)
+        self._state: list[float] = list(self._compiled.initial)
+
+    def _use(self, settings: Settings) -> None:
+        """Compile the program of settings."""
         from pidemu.targets.python import compiled
 
+        self.settings = settings
+        self._faults = settings.equation.faults or Faults()
+        self.program: Program = self._program(self.interval)
         self._compiled: Compiled = compiled(self.program)
         self._scan = self._compiled.scan
-        self._state: list[float] = list(self.program.initial)
+        self._others: dict[float, Compiled] = {}
+
+    def _program(self, h: float) -> Program:
+        return build(
+            self.settings.algorithm(own_units=True, scan=h),
+            h,
+            action=self._action,
+            limits=self._limits,
+            bias=self._bias,
+            initial_output=self._initial_output,
+            signals=self._signals,
+            title=f"{self.settings.summary}; scan {self.interval:g} s, {self._action} acting",
+        )
+
+    def _at(self, h: float) -> Compiled:
+        """Return the compiled program for another scan interval [s]."""
+        from pidemu.targets.python import compiled
+
+        if h == self.interval:
+            return self._compiled
+        found = self._others.get(h)
+        if found is None:
+            if len(self._others) >= _REMEMBERED:
+                self._others.clear()
+            program = self._program(h)
+            if [q.name for q in program.states] != [q.name for q in self.program.states]:
+                raise ScanError(f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running")
+            found = self._others[h] = compiled(program, like=(self.program, self._compiled))
+        return found
 
     @property
     def state(self) -> dict[str, float]:
         """What the program keeps from scan to scan, by name."""
-        return {q.name: value for q, value in zip(self.program.states, self._state, strict=True)}
+        return {q.name: float(value) for q, value in zip(self.program.states, self._state, strict=True)}
 
     @property
     def output(self) -> float:
         """The last output."""
         return self.state["u"]
 
-    def reset(self) -> None:
-        """Go back to before the first scan."""
-        self._state[:] = self.program.initial
+    @property
+    def mode(self) -> Mode:
+        """The mode of the last scan."""
+        return self._mode
 
-    def scan(self, sp: float, pv: float, auto: bool = True, manual: float | None = None) -> float:
+    def reset(self) -> None:
+        """Go back to before the first scan; the settings stay."""
+        self._state[:] = self._compiled.initial
+        self._mode, self._count, self._last = "power-up", 0, ()
+        self.events.clear()
+
+    def change(self, settings: Settings | Mapping[str, object] | None = None, /, **values: object) -> Settings:
+        """Change settings while running, as the real controller takes it (specs/equations.md, section 6).
+
+        The states stay. A gain that acts on what the integral holds bumps the output; a card with ``changes: bumpless`` sets the integral
+        so that it does not. Where the new settings bring terms that were off, these start at rest, from the last signals.
+
+        Parameters
+        ----------
+        settings : Settings or mapping, optional
+            New settings of the same card; or a mapping of those that change.
+        **values
+            Settings and options that change, by name.
+
+        Returns
+        -------
+        Settings
+            The settings now in force.
+
+        Raises
+        ------
+        ScanError
+            The settings are another card's.
+        SettingError
+            A setting is unknown or out of range; the old ones stay in force.
+        """
+        old = self.settings
+        new = settings if isinstance(settings, Settings) else old.changed({**(settings or {}), **values})
+        if new.card.id != old.card.id:
+            raise ScanError(f"the controller runs {old.card.id}; settings of {new.card.id} need a controller of their own")
+        before, compiled_before, state = self.program, self._compiled, self.state
+        try:
+            self._use(new)
+        except ScanError:
+            self._use(old)
+            raise
+        self._carry(state)
+        if self._last:
+            if new.algorithm().bumpless_changes and self._mode in ("automatic", "cascade"):
+                self._keep_output(old, new)
+            expected = compiled_before.scan([state[q.name] for q in before.states], *self._last)
+            bump = float(self._compiled.scan(list(self._state), *self._last)) - float(expected)
+            what = ", ".join(f"{n} = {v.value:g}" for n, v in new.items() if n not in old or old[n].value != v.value)
+            options = ", ".join(f"{n} = {c}" for n, c in new.options.items() if old.options[n] != c)
+            self.events.append(Event(self._count, "settings", ", ".join(filter(None, (what, options))) or "no change", bump))
+        return new
+
+    def _carry(self, state: Mapping[str, float]) -> None:
+        """Take over the states of the program before; states that it did not have start at rest, from the last signals."""
+        fresh = list(self._compiled.initial)
+        if self._last and any(q.name not in state for q in self.program.states):
+            named = dict(zip((q.name for q in self.program.inputs), self._last, strict=False))
+            named |= {"auto": 0.0, "manual": state["u"], "track": math.nan}
+            self._compiled.scan(fresh, *(named.get(q.name, math.nan) for q in self.program.inputs))
+        self._state = [state.get(q.name, float(x)) for q, x in zip(self.program.states, fresh, strict=True)]
+
+    def _keep_output(self, old: Settings, new: Settings) -> None:
+        """Move the integral by what the proportional term is less, at the last signals (the listing's parameter change)."""
+        places = {q.name: i for i, q in enumerate(self.program.states)}
+        if "I" in places:
+            sp, pv = self._last[:2]
+            terms = [a.kp * (a.b * sp - pv) for a in (old.algorithm(own_units=True), new.algorithm(own_units=True))]
+            sign = 1.0 if self._action == "reverse" else -1.0
+            self._state[places["I"]] += sign * (terms[0] - terms[1])
+
+    def scan(
+        self,
+        sp: float,
+        pv: float,
+        auto: bool = True,
+        manual: float | None = None,
+        *,
+        cascade: float | None = None,
+        track: float | None = None,
+        external_reset: float | None = None,
+        feedforward: float | None = None,
+        hold: bool = False,
+        interval: float | None = None,
+    ) -> float:
         """Do one scan.
 
         Parameters
         ----------
         sp, pv : float
-            Setpoint and measurement [% of span; engineering units for a card with ``signals: engineering``].
+            Setpoint and measurement [% of span; engineering units for a card with ``signals: engineering``]. What happens with NaN and
+            infinity is the card's (``faults.signal``); by default the output is held and `events` says so.
         auto : bool
             Automatic; otherwise manual.
         manual : float, optional
             Output set by the operator in manual [as output limits]; without it the output is held.
+        cascade : float, optional
+            Remote setpoint: an automatic loop is in cascade while there is one.
+        track : float, optional
+            Output to follow: the loop is tracking while there is one, whatever `auto` says.
+        external_reset : float, optional
+            External reset signal, for cards whose windup scheme is external-reset [as output limits].
+        feedforward : float, optional
+            Feedforward signal, for cards that have one [as output limits].
+        hold : bool
+            Nothing is computed and the output stands; the scan after it is a transfer.
+        interval : float, optional
+            Time since the last scan [s]; by default the nominal one. It counts with cards that measure it (``scan.interval: measured``).
 
         Returns
         -------
@@ -145,13 +309,116 @@ class Controller:
         Raises
         ------
         ScanError
-            Setpoint or measurement is not a finite number, or the manual output is infinite.
+            The manual output is infinite, the card has no use for a signal, or it refuses the interval.
         """
-        if not (math.isfinite(sp) and math.isfinite(pv)):
-            raise ScanError(f"setpoint {sp} and measurement {pv} must be finite numbers")
-        if manual is not None and math.isinf(manual):
+        given = {"cascade": cascade, "track": track, "external_reset": external_reset, "feedforward": feedforward}
+        extra = {name: float(x) for name, x in given.items() if x is not None}
+        if extra:
+            self._read(extra)
+        by_hand = math.nan if manual is None else manual
+        if math.isinf(by_hand):
             raise ScanError(f"the manual output {manual} is not a finite number")
-        return self._scan(self._state, sp, pv, 1.0 if auto else 0.0, math.nan if manual is None else manual)
+        mode: Mode = "automatic" if auto else "manual"
+        inputs: tuple[float, ...] = (sp, pv, 1.0 if auto else 0.0, by_hand)
+        if self._signals:
+            inputs += tuple(_absent(s) if s not in extra else extra[s] for s in self._names)
+            mode = "tracking" if not math.isnan(extra.get("track", math.nan)) else mode
+            mode = "cascade" if auto and mode == "automatic" and not math.isnan(extra.get("cascade", math.nan)) else mode
+        compiled = self._compiled
+        if hold or interval is not None or not (math.isfinite(sp) and math.isfinite(pv)):
+            found = self._odd(mode, inputs, hold, interval)
+            if isinstance(found, float):
+                return found
+            compiled = found
+        if mode is self._mode:
+            u = compiled.scan(self._state, *inputs)
+        else:
+            was = self.output
+            u = compiled.scan(self._state, *inputs)
+            self._transfer(self._count, mode, float(u) - was)
+        self._last = inputs
+        self._count += 1
+        return u
+
+    def _transfer(self, scan: int, mode: Mode, bump: float) -> None:
+        self.events.append(Event(scan, "transfer", f"{self._mode} to {mode}", bump))
+        self._mode = mode
+
+    @property
+    def _names(self) -> list[str]:
+        """The arguments that the program reads, in its order."""
+        wanted = {program: argument for argument, program in _SIGNALS.items()}
+        return [wanted[q.name] for q in self.program.inputs[4:]]
+
+    def _read(self, extra: Mapping[str, object]) -> None:
+        """Make the program read signals that it did not read so far."""
+        a = self.settings.algorithm()
+        if "external_reset" in extra and a.windup != "external-reset":
+            raise ScanError(
+                f"{self.settings.card.id} takes no external reset: its windup scheme is '{a.windup}'; leave the signal out"
+            )
+        if "feedforward" in extra and a.feedforward is None:
+            raise ScanError(f"{self.settings.card.id} states no feedforward input; leave the signal out")
+        wanted = tuple(program for argument, program in _SIGNALS.items() if argument in extra or program in self._signals)
+        if wanted != self._signals:
+            state, self._signals = self.state, wanted
+            if self._last:
+                old = dict(zip((q.name for q in self.program.inputs), self._last, strict=True))
+                self._use(self.settings)
+                self._last = tuple(old.get(q.name, 0.0 if q.name == "feedforward" else math.nan) for q in self.program.inputs)
+            else:
+                self._use(self.settings)
+            self._carry(state)
+
+    def _odd(self, mode: Mode, inputs: tuple[float, ...], hold: bool, interval: float | None) -> float | Compiled:
+        """Deal with a hold, a bad signal or an uneven interval: return the output, or the program that computes it."""
+        if hold:
+            return self._stand("hold", inputs)
+        bad = not (math.isfinite(inputs[0]) and math.isfinite(inputs[1]))
+        policy = self._faults.signal
+        if bad:
+            name, value = ("setpoint", inputs[0]) if not math.isfinite(inputs[0]) else ("measurement", inputs[1])
+            done = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}[policy]
+            self.events.append(Event(self._count, "signal", f"{name} is {value}: {done}"))
+            if policy != "propagate":
+                instead = None if policy == "hold" or mode not in ("automatic", "cascade") else math.nan if policy == "nan" else 0.0
+                return self._stand(mode, inputs, instead)
+        if interval is None or self.settings.equation.scan.interval == "nominal":
+            return self._compiled
+        h = self._usable(interval)
+        return self._stand(mode, inputs) if h is None else self._at(h)
+
+    def _usable(self, interval: float) -> float | None:
+        """Return the interval that the card computes with [s]; ``None`` where it does nothing."""
+        faults, h = self._faults, interval
+        if h < 0 and faults.negative_interval == "refuse":
+            raise ScanError(f"{self.settings.card.id} refuses a scan interval of {h:g} s; give a positive one")
+        if h < 0 and faults.negative_interval == "zero":
+            self.events.append(Event(self._count, "interval", f"interval of {h:g} s: counted as 0"))
+            h = 0.0
+        if h == 0 and faults.zero_interval == "compute":
+            return 0.0
+        if h > 0 and math.isfinite(h):
+            return h
+        self.events.append(Event(self._count, "interval", f"interval of {interval:g} s: nothing computed, output held"))
+        return None
+
+    def _stand(self, mode: Mode, inputs: tuple[float, ...], instead: float | None = None) -> float:
+        """Compute nothing: the output is the last one, or the operator's in manual, or `instead`; the state stands still."""
+        names = [q.name for q in self.program.states]
+        at, was = names.index("u"), float(self._state[names.index("u")])
+        u = was
+        if mode in ("manual", "tracking", "hold"):
+            follow = inputs[4 + self._names.index("track")] if "track" in self._signals else math.nan
+            by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else math.nan
+            u = was if math.isnan(by_hand) else by_hand
+            self._state[at] = u
+            if "on" in names:
+                self._state[names.index("on")] = 0.0
+        if mode != self._mode:
+            self._transfer(self._count, mode, u - was)
+        self._count += 1
+        return u if instead is None else instead
 
     def run(
         self,
@@ -159,6 +426,13 @@ class Controller:
         pv: npt.ArrayLike,
         auto: npt.ArrayLike | None = None,
         manual: npt.ArrayLike | None = None,
+        *,
+        cascade: npt.ArrayLike | None = None,
+        track: npt.ArrayLike | None = None,
+        external_reset: npt.ArrayLike | None = None,
+        feedforward: npt.ArrayLike | None = None,
+        hold: npt.ArrayLike | None = None,
+        interval: npt.ArrayLike | None = None,
     ) -> Floats:
         """Do one scan per sample, going on from the present state.
 
@@ -170,6 +444,12 @@ class Controller:
             Automatic; by default throughout.
         manual : array_like, shape (n,) or scalar, optional
             Output set by the operator; NaN or nothing holds the output.
+        cascade, track, external_reset, feedforward : array_like, shape (n,) or scalar, optional
+            As in `scan`; NaN where there is no such signal.
+        hold : array_like of bool, shape (n,) or scalar, optional
+            As in `scan`.
+        interval : array_like, shape (n,) or scalar, optional
+            Time since the last scan [s], as in `scan`.
 
         Returns
         -------
@@ -179,37 +459,104 @@ class Controller:
         Raises
         ------
         ScanError
-            The signals have different lengths, or setpoint or measurement hold what is not a finite number, or the manual
-            output is infinite.
+            The signals have different lengths, the mode is not a number, the manual output is infinite, the card has no use for a
+            signal, or it refuses an interval.
         """
-        columns = [sp, pv, True if auto is None else auto, math.nan if manual is None else manual]
-        arrays = [np.asarray(c, dtype=float) for c in columns]
-        try:
-            signals = np.broadcast_arrays(*(np.atleast_1d(a) for a in arrays))
-        except ValueError:
-            lengths = ", ".join(str(a.size) for a in arrays)
-            raise ScanError(f"the signals have different lengths: {lengths}") from None
-        if signals[0].ndim != 1:
-            raise ScanError("the signals must be one-dimensional")
-        bad = np.flatnonzero(~np.isfinite(signals[0]) | ~np.isfinite(signals[1]))
-        if bad.size:
-            raise ScanError(f"setpoint or measurement is not a finite number in sample {bad[0]} (counted from 0)")
-        if np.isnan(signals[2]).any():
-            raise ScanError(f"the mode is not a number in sample {np.flatnonzero(np.isnan(signals[2]))[0]} (counted from 0)")
-        if np.isinf(signals[3]).any():
-            raise ScanError(f"the manual output is infinite in sample {np.flatnonzero(np.isinf(signals[3]))[0]} (counted from 0)")
-        out = np.empty(signals[0].size)
-        auto_on = signals[2] > 0
-        edges = [0, *(np.flatnonzero(np.diff(auto_on)) + 1).tolist(), out.size]
-        for start, end in itertools.pairwise(edges):
-            self._spell(out[start:end], *(s[start:end] for s in signals))
+        given = {"cascade": cascade, "track": track, "external_reset": external_reset, "feedforward": feedforward}
+        extra = {name: x for name, x in given.items() if x is not None}
+        if extra:
+            self._read(extra)
+        columns = {"sp": sp, "pv": pv, "auto": True if auto is None else auto, "manual": math.nan if manual is None else manual}
+        columns |= {s: extra.get(s, _absent(s)) for s in self._names}
+        columns |= {"hold": False if hold is None else hold, "interval": self.interval if interval is None else interval}
+        signals = dict(zip(columns, _broadcast(list(columns.values())), strict=True))
+        if "feedforward" in signals:
+            signals["feedforward"] = np.where(np.isnan(signals["feedforward"]), 0.0, signals["feedforward"])
+        for name, bad in (("the mode is not a number", np.isnan(signals["auto"])), ("the manual output is infinite", np.isinf(signals["manual"]))):
+            if bad.any():
+                raise ScanError(f"{name} in sample {np.flatnonzero(bad)[0]} (counted from 0)")
+        return self._run(signals, measured=interval is not None and self.settings.equation.scan.interval == "measured")
+
+    def _run(self, signals: Mapping[str, Floats], measured: bool) -> Floats:
+        modes = _modes(signals)
+        out = np.empty(modes.size)
+        odd = (signals["hold"] > 0) | ~np.isfinite(signals["sp"]) | ~np.isfinite(signals["pv"])
+        if measured:
+            odd |= signals["interval"] != self.interval
+        inputs = [signals[name] for name in ("sp", "pv", "auto", "manual", *self._names)]
+        for start, end in _spells(modes, odd):
+            mode = _MODES[modes[start]]
+            if odd[start]:
+                for i in range(start, end):
+                    out[i] = self._odd_scan(mode, tuple(float(s[i]) for s in inputs), signals, i, measured)
+            else:
+                self._spell(mode, out[start:end], [s[start:end] for s in inputs])
         return out
 
-    def _spell(self, out: Floats, sp: Floats, pv: Floats, auto: Floats, manual: Floats) -> None:
+    def _odd_scan(self, mode: Mode, inputs: tuple[float, ...], signals: Mapping[str, Floats], i: int, measured: bool) -> float:
+        hold = bool(signals["hold"][i] > 0)
+        found = self._odd(mode, inputs, hold, float(signals["interval"][i]) if measured else None)
+        if isinstance(found, float):
+            return found
+        was = self.output
+        with self._quiet():
+            u = float(found.scan(self._state, *inputs))
+        if mode != self._mode:
+            self._transfer(self._count, mode, u - was)
+        self._last = inputs
+        self._count += 1
+        return u
+
+    def _spell(self, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
-        general = 1 if auto.size and auto[0] > 0 else auto.size
-        head = [s[:general].tolist() for s in (sp, pv, auto, manual)]
-        out[:general] = self._compiled.run(self._state, *head)
-        if general < out.size:
-            tail = self._compiled.run_automatic(self._state, sp[general:].tolist(), pv[general:].tolist())
-            out[general:] = np.fromiter(tail, float, len(tail))
+        was = self.output
+        general = 1 if mode in ("automatic", "cascade") else out.size
+        with self._quiet():
+            out[:general] = self._compiled.run(self._state, *(s[:general].tolist() for s in inputs))
+            if general < out.size:
+                wanted = {q.name for q in self.program.inputs} - {"auto", "manual", "track"}
+                tail = [s[general:].tolist() for q, s in zip(self.program.inputs, inputs, strict=True) if q.name in wanted]
+                rest = self._compiled.run_automatic(self._state, *tail)
+                out[general:] = np.fromiter(rest, float, len(rest))
+        if mode != self._mode:
+            self._transfer(self._count, mode, float(out[0]) - was)
+        self._last = tuple(float(s[-1]) for s in inputs)
+        self._count += out.size
+
+    def _quiet(self) -> contextlib.AbstractContextManager[Any]:
+        """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
+        return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
+
+
+def _absent(signal: str) -> float:
+    """Return what a signal is where there is none."""
+    return 0.0 if signal == "feedforward" else math.nan
+
+
+def _broadcast(columns: Sequence[npt.ArrayLike]) -> list[Floats]:
+    arrays = [np.asarray(c, dtype=float) for c in columns]
+    try:
+        signals = np.broadcast_arrays(*(np.atleast_1d(a) for a in arrays))
+    except ValueError:
+        lengths = ", ".join(str(a.size) for a in arrays[:4])
+        raise ScanError(f"the signals have different lengths: {lengths}") from None
+    if signals[0].ndim != 1:
+        raise ScanError("the signals must be one-dimensional")
+    return list(signals)
+
+
+def _modes(signals: Mapping[str, Floats]) -> npt.NDArray[np.int_]:
+    """Return the number of the mode of every sample in `_MODES`."""
+    modes = np.where(signals["auto"] > 0, 1, 0)
+    if "cascade" in signals:
+        modes = np.where((modes == 1) & ~np.isnan(signals["cascade"]), 2, modes)
+    if "track" in signals:
+        modes = np.where(~np.isnan(signals["track"]), 3, modes)
+    return np.where(signals["hold"] > 0, 4, modes)
+
+
+def _spells(modes: npt.NDArray[np.int_], odd: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield start and end of every stretch in one mode that is odd or even throughout."""
+    if modes.size:
+        edges = np.flatnonzero((np.diff(modes) != 0) | (np.diff(odd.astype(int)) != 0)) + 1
+        yield from itertools.pairwise([0, *edges.tolist(), modes.size])

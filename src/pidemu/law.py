@@ -16,12 +16,14 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm import Algorithm, check_filters
+from pidemu.algorithm import Algorithm, Dahlin, Lag, check_filters
 from pidemu.card.models import Rule
-from pidemu.errors import ScanError
+from pidemu.errors import ScanError, UndefinedError
 from pidemu.rational import Rational, Response, add, multiply
 
 PathName = Literal["feedback", "setpoint"]
+
+_DERIVATIVE_ONLY: Final = "the {} rule is one of the derivative only"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +38,20 @@ class Operators:
         From filter time [s] to ``s/(1 + Tf s)``.
     lag : callable
         From filter time [s] and order to ``1/(1 + Tf s)`` or ``1/(1 + Tf s + Tf^2 s^2/2)``.
+    signal_lag : callable
+        The same from a `Lag`, the filter on a signal.
+    delay : object
+        One scan; 1 in the continuous law, which has none.
+    pole_cancellation : callable
+        From a `Dahlin` to its law.
     """
 
     integrator: Any
     differentiator: Callable[[Any], Any]
     lag: Callable[[Any, int], Any]
+    signal_lag: Callable[[Lag], Any]
+    delay: Any
+    pole_cancellation: Callable[[Dahlin], Any]
 
 
 def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
@@ -58,6 +69,9 @@ def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
     feedback, setpoint
         ``Cy`` and ``Cr``, of the type that the operators make.
     """
+    if a.dahlin is not None:
+        law = op.pole_cancellation(a.dahlin)
+        return _before_the_algorithm(a, op, law, law)
     d = op.differentiator(a.Tf if a.filter_on == "term" else 0.0)
     pi = a.ki * op.integrator + a.kp
     setpoint = a.ki * op.integrator + a.kp * a.b
@@ -74,13 +88,36 @@ def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
     elif a.filter_on == "output":
         lag = op.lag(a.Tf, a.filter_order)
         feedback, setpoint = feedback * lag, setpoint * lag
+    return _before_the_algorithm(a, op, feedback, setpoint)
+
+
+def _before_the_algorithm(a: Algorithm, op: Operators, feedback: Any, setpoint: Any) -> tuple[Any, Any]:
+    """Return both paths with what is done to the signals first (specs/equations.md, sections 4 and 6)."""
+    if a.e_filter is not None:
+        lag = op.signal_lag(a.e_filter)
+        feedback, setpoint = feedback * lag, setpoint * lag
+    if a.sp_filter is not None:
+        setpoint = setpoint * op.signal_lag(a.sp_filter)
+    if a.pv_filter is not None:
+        feedback = feedback * op.signal_lag(a.pv_filter)
+    if a.previous_pv:
+        feedback = feedback * op.delay
     return feedback, setpoint
+
+
+def _no_continuous_law(d: Dahlin) -> Any:
+    raise UndefinedError(
+        f"pole cancellation for a dead time of {d.delay:g} s is a recursion in scans and has no continuous law; give a scan interval"
+    )
 
 
 CONTINUOUS: Final = Operators(
     integrator=Rational((1.0,), (0.0, 1.0)),
     differentiator=lambda Tf: Rational((0.0, 1.0), (1.0, Tf)),
     lag=lambda Tf, order: Rational((1.0,), (1.0, Tf, Tf * Tf / 2) if order == 2 else (1.0, Tf)),
+    signal_lag=lambda f: Rational((1.0,), (1.0, f.time)),
+    delay=1.0,
+    pole_cancellation=_no_continuous_law,
 )
 """Rational functions of ``s``."""
 
@@ -92,6 +129,9 @@ def at_frequencies(w: npt.ArrayLike) -> Operators:
         integrator=1 / s,
         differentiator=lambda Tf: s / (1 + Tf * s),
         lag=lambda Tf, order: 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s),
+        signal_lag=lambda f: 1 / (1 + f.time * s),
+        delay=1.0,
+        pole_cancellation=_no_continuous_law,
     )
 
 
@@ -111,8 +151,16 @@ def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
                 return rest / (h * (1 - rest))
             case Rule.TRAPEZOIDAL:
                 return 2 * rest / (h * (2 - rest))
+        raise ValueError(_DERIVATIVE_ONLY.format(rule.value))
 
     def differentiator(Tf: float) -> Response:
+        if a.derivative_rule is Rule.FOUR_POINT:
+            q = 1 - rest
+            return rest * (3 + 4 * q + 3 * q * q) / (10 * h)
+        if Tf and a.derivative_rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
+            keep, take = math.exp(-h / Tf), -math.expm1(-h / Tf)
+            gain = take / h if a.derivative_rule is Rule.EXACT else keep / Tf
+            return gain * rest / (take + keep * rest)
         s = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
         return s / (1 + Tf * s)
 
@@ -120,7 +168,19 @@ def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
         s = s_of(a.filter_rule)
         return 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s)
 
-    return Operators(1 / s_of(a.integral_rule), differentiator, lag)
+    def pole_cancellation(d: Dahlin) -> Response:
+        g, p, q, delay = d.numbers(h)
+        old = -np.expm1(-1j * np.asarray(w, dtype=float) * h * (delay + 1))  # 1 - z^-(N+1)
+        return g * (1 - p * (1 - rest)) / (q * rest + (1 - q) * old)
+
+    return Operators(
+        integrator=1 / s_of(a.integral_rule),
+        differentiator=differentiator,
+        lag=lag,
+        signal_lag=lambda f: 1 / (1 + f.at(h) * s_of(f.rule)),
+        delay=1 - rest,
+        pole_cancellation=pole_cancellation,
+    )
 
 
 def discrete_operators(a: Algorithm, h: float) -> Operators:
@@ -142,10 +202,17 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
                 return (1.0, -1.0), (0.0, h)
             case Rule.TRAPEZOIDAL:
                 return (2.0, -2.0), (h, h)
+        raise ValueError(_DERIVATIVE_ONLY.format(rule.value))
 
     integral = s_of(a.integral_rule)
 
     def differentiator(Tf: float) -> Rational:
+        if a.derivative_rule is Rule.FOUR_POINT:
+            return Rational((3.0, 1.0, -1.0, -3.0), (10 * h,))
+        if Tf and a.derivative_rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
+            keep = math.exp(-h / Tf)
+            gain = -math.expm1(-h / Tf) / h if a.derivative_rule is Rule.EXACT else keep / Tf
+            return Rational((gain, -gain), (1.0, -keep))
         top, bottom = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
         return Rational(top, add(bottom, multiply((Tf,), top)))
 
@@ -157,7 +224,22 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
         den = add(add(square, multiply((Tf,), multiply(top, bottom))), multiply((Tf * Tf / 2,), multiply(top, top)))
         return Rational(square, den)
 
-    return Operators(Rational(integral[1], integral[0]), differentiator, lag)
+    def signal_lag(f: Lag) -> Rational:
+        top, bottom = s_of(f.rule)
+        return Rational(bottom, add(bottom, multiply((f.at(h),), top)))
+
+    def pole_cancellation(d: Dahlin) -> Rational:
+        g, p, q, delay = d.numbers(h)
+        return Rational((g, -g * p), add((1.0, -q), (*[0.0] * (delay + 1), q - 1)))
+
+    return Operators(
+        integrator=Rational(integral[1], integral[0]),
+        differentiator=differentiator,
+        lag=lag,
+        signal_lag=signal_lag,
+        delay=Rational((0.0, 1.0)),
+        pole_cancellation=pole_cancellation,
+    )
 
 
 @dataclass(frozen=True)
@@ -239,6 +321,8 @@ class Law:
         ------
         ValueError
             The law is discrete.
+        UndefinedError
+            More filters are at work than these coefficients can hold, or there is no continuous law.
         """
         self._continuous()
         num, den = self.feedback.num, self.feedback.den
@@ -246,6 +330,8 @@ class Law:
             den = den[1:]
         else:
             num = (0.0, *num)
+        if len(_trim(num)) > 3 or len(_trim(den)) > 3:
+            raise UndefinedError("more than one filter is at work: the law has no five coefficients")
         n0, n1, n2 = (*(x / den[0] for x in num), 0.0, 0.0, 0.0)[:3]
         d1, d2 = (*(x / den[0] for x in den[1:]), 0.0, 0.0)[:2]
         return n0, n1, n2, d1, d2

@@ -65,7 +65,7 @@ class Value:
     @property
     def canonical(self) -> float:
         """The value in canonical units; 0 for a term that is off (see `pidemu.units`)."""
-        if self.off and self.role in (Role.INTEGRAL, Role.DERIVATIVE, Role.GAIN):
+        if self.off and self.role in (Role.INTEGRAL, Role.DERIVATIVE, Role.GAIN, Role.FILTER_TIME):
             return 0.0
         return to_canonical(self.role, self.value, parse_unit(self.unit), self.spans)
 
@@ -190,7 +190,22 @@ class Settings(Mapping[str, Value]):
         a = self.algorithm()
         return [s for s in found if a.kd or a.Tf or not s.path.startswith("derivative")]
 
-    def algorithm(self, *, own_units: bool = False) -> Algorithm:
+    def changed(self, values: Mapping[str, object]) -> Settings:
+        """Return these settings with some changed, by name; options as well.
+
+        Raises
+        ------
+        SettingError
+            A setting is unknown or out of range.
+        """
+        new = {name.casefold() for name in values}
+        given: dict[str, object] = {n: v.value for n, v in self.items() if v.given and n.casefold() not in new}
+        given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
+        ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
+        given |= {name: value for name, value in ranges if value is not None and name not in values}
+        return self.card.settings({**given, **values})
+
+    def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.
 
         Parameters
@@ -198,6 +213,8 @@ class Settings(Mapping[str, Value]):
         own_units : bool
             For a card that computes in engineering units: leave the gains in those units, as the scan program needs them,
             instead of percent of span.
+        scan : float, optional
+            Scan interval, for filters that are set as a share per scan [s]; by default the card's.
 
         Raises
         ------
@@ -206,7 +223,7 @@ class Settings(Mapping[str, Value]):
         """
         from pidemu.canonical import algorithm_of  # numbers are made from settings, not settings from numbers
 
-        return algorithm_of(self, own_units=own_units)
+        return algorithm_of(self, own_units=own_units, scan=scan)
 
     def law(self, scan: float | None = None) -> Law:
         """Return the linear law (specs/equations.md, section 2).
@@ -218,7 +235,7 @@ class Settings(Mapping[str, Value]):
         """
         from pidemu.law import Law  # the law is made from settings, not settings from the law
 
-        return Law(self.algorithm(), scan)
+        return Law(self.algorithm(scan=scan), scan)
 
 
 def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
@@ -241,12 +258,24 @@ def is_active(equation: Equation, name: str, setting: Setting) -> bool:
         case Role.FILTER_RATIO | Role.FILTER_GAIN:
             return has_derivative and filt is not None and name in (filt.ratio, filt.gain)
         case Role.FILTER_TIME:
-            return filt is not None and name == filt.time and (has_derivative or filt.applies_to != "term")
+            of_derivative = filt is not None and name == filt.time and (has_derivative or filt.applies_to != "term")
+            return of_derivative or name in _signal_filter_times(equation)
         case Role.PROPORTIONAL_WEIGHT:
             return equation.proportional.on == "weighted" and name == equation.proportional.weight
         case Role.DERIVATIVE_WEIGHT:
             return equation.derivative.on == "weighted" and name == equation.derivative.weight
         case Role.TRACKING_TIME:
-            return isinstance(windup, WindupBackCalculation) and name == windup.tracking_time
+            return isinstance(windup, WindupBackCalculation) and equation.integral.on != "none" and name == windup.tracking_time
+        case Role.DEADBAND:
+            return (equation.error is not None and equation.error.shape == "gap") or equation.integral.deadband == name
+        case Role.GAP_GAIN:
+            return equation.error is not None and equation.error.shape == "gap"
+        case Role.LINEARITY:
+            return equation.error is not None and equation.error.shape == "gain-linear"
         case _:
             return True
+
+
+def _signal_filter_times(equation: Equation) -> list[object]:
+    parts = (equation.setpoint, equation.measurement, equation.error)
+    return [part.filter.time for part in parts if part is not None and part.filter is not None]

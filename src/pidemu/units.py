@@ -8,13 +8,14 @@ role of the dial    canonical quantity                      unit
 gain                proportional gain                       %/%
 integral            reset rate ``1/Ti``, or ``ki``          1/s
 derivative          ``Td``, or ``kd``                       s
-filter-time         filter time constant                    s
-tracking-time       tracking time constant                  s
+all other times     the time                                s
+levels              a signal: deadband, bias, limit         %
+rates               change of a signal                      %/s
 all others          the plain ratio                         1
 =================== ======================================= =========
 
 Unit conversion is exact rational arithmetic, rounded once, so that 4 repeats per minute are 15 s per repeat and not
-15.000000000000002. Infinity is a value of the integral time (no integral action); zero is its reset rate.
+15.000000000000002. A card that computes in engineering units has its levels and rates in those. Infinity is a value of the integral time (no integral action); zero is its reset rate.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ class Dimension(StrEnum):
     TIME_PER_REPEAT = "a time per repeat"
     REPEATS_PER_TIME = "repeats per time"
     PER_TIME = "a rate (1/time)"
+    PERCENT_PER_TIME = "percent per time"
+    UNITS_PER_TIME = "engineering units per time"
+    FREQUENCY = "a frequency"
 
 
 class Role(StrEnum):
@@ -56,6 +60,27 @@ class Role(StrEnum):
     PROPORTIONAL_WEIGHT = "proportional-weight"
     DERIVATIVE_WEIGHT = "derivative-weight"
     TRACKING_TIME = "tracking-time"
+    FILTER_FACTOR = "filter-factor"
+    INTEGRAL_LIMIT = "integral-limit"
+    DEADBAND = "deadband"
+    GAP_GAIN = "gap-gain"
+    LINEARITY = "linearity"
+    FEEDFORWARD_GAIN = "feedforward-gain"
+    BIAS = "bias"
+    OUTPUT_RATE = "output-rate"
+    SETPOINT_RATE = "setpoint-rate"
+    RESOLUTION = "resolution"
+    PROCESS_GAIN = "process-gain"
+    PROCESS_TIME = "process-time"
+    PROCESS_DELAY = "process-delay"
+    CLOSED_LOOP_TIME = "closed-loop-time"
+
+
+LEVELS: Final = (Role.INTEGRAL_LIMIT, Role.DEADBAND, Role.BIAS, Role.RESOLUTION)
+"""Roles whose canonical value is a signal's [%]."""
+RATES: Final = (Role.OUTPUT_RATE, Role.SETPOINT_RATE)
+"""Roles whose canonical value is a signal's rate of change [%/s]."""
+_OF_MEASUREMENT: Final = (Role.DEADBAND, Role.SETPOINT_RATE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +134,7 @@ def _table() -> dict[str, Unit]:
         Unit("eu", Dimension.PV_UNITS),
         Unit("eu/eu", Dimension.OP_PER_PV),
         Unit("%/eu", Dimension.PERCENT_PER_PV),
+        Unit("Hz", Dimension.FREQUENCY, Fraction(2 * math.pi)),
     ]
     for name, size in seconds.items():
         units += [
@@ -116,6 +142,8 @@ def _table() -> dict[str, Unit]:
             Unit(f"{name}/repeat", Dimension.TIME_PER_REPEAT, size),
             Unit(f"repeat/{name}", Dimension.REPEATS_PER_TIME, 1 / size),
             Unit(f"1/{name}", Dimension.PER_TIME, 1 / size),
+            Unit(f"%/{name}", Dimension.PERCENT_PER_TIME, 1 / size),
+            Unit(f"eu/{name}", Dimension.UNITS_PER_TIME, 1 / size),
         ]
     return {u.name: u for u in units}
 
@@ -126,7 +154,7 @@ UNITS: Final = _table()
 _WORDS: Final = {
     "ms": "ms", "msec": "ms", "millisecond": "ms", "s": "s", "sec": "s", "second": "s", "min": "min", "minute": "min",
     "mn": "min", "h": "h", "hr": "h", "hour": "h", "repeat": "repeat", "rep": "repeat", "rpt": "repeat", "": "1",
-    "1": "1", "%": "%", "percent": "%", "eu": "eu",
+    "1": "1", "%": "%", "percent": "%", "eu": "eu", "hz": "Hz",
 }  # fmt: skip
 _WHOLE: Final = {"rpm": "repeat/min", "psi/in": "eu/eu", "psi/inch": "eu/eu"}
 _NUMBER: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|inf(?:inity)?|nan))\s*(.*?)\s*$", re.I)
@@ -138,8 +166,13 @@ _ACCEPTED: Final[dict[Role, tuple[Dimension, ...]]] = {
     ),
     Role.INTEGRAL: _TIMELIKE,
     Role.DERIVATIVE: (Dimension.TIME,),
-    Role.FILTER_TIME: (Dimension.TIME,),
-    Role.TRACKING_TIME: (Dimension.TIME,),
+    Role.FILTER_TIME: (Dimension.TIME, Dimension.FREQUENCY),
+    Role.TRACKING_TIME: (Dimension.TIME, Dimension.RATIO),
+    Role.PROCESS_TIME: (Dimension.TIME,),
+    Role.PROCESS_DELAY: (Dimension.TIME,),
+    Role.CLOSED_LOOP_TIME: (Dimension.TIME,),
+    **dict.fromkeys(LEVELS, (Dimension.PERCENT, Dimension.PV_UNITS, Dimension.RATIO)),
+    **dict.fromkeys(RATES, (Dimension.PERCENT_PER_TIME, Dimension.UNITS_PER_TIME)),
 }  # fmt: skip
 _PLAIN: Final = (Dimension.RATIO, Dimension.PERCENT)
 _INVERTED: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
@@ -195,6 +228,11 @@ def _constant(role: Role, unit: Unit, spans: Spans) -> Fraction:
                 return Fraction(spans.pv) / 100
             case _:
                 return Fraction(1)
+    if role in LEVELS or role in RATES:
+        per_time = unit.factor if role in RATES else 1
+        span = spans.pv if role in _OF_MEASUREMENT else spans.op
+        in_units = unit.dimension in (Dimension.PV_UNITS, Dimension.UNITS_PER_TIME)
+        return Fraction(100) / Fraction(span) * per_time if in_units else Fraction(per_time)
     return 1 / unit.factor if is_reciprocal(role, unit) else unit.factor
 
 
@@ -212,6 +250,8 @@ def is_reciprocal(role: Role, unit: Unit) -> bool:
     """Tell whether a larger dial value means a smaller canonical one (proportional band, integral time)."""
     if role is Role.GAIN:
         return unit.dimension in (Dimension.PERCENT, Dimension.PV_UNITS)
+    if role is Role.FILTER_TIME:
+        return unit.dimension is Dimension.FREQUENCY
     return role is Role.INTEGRAL and unit.dimension in _INVERTED
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.algorithm import Algorithm, Place, Scheme
 from pidemu.card.load import variants
-from pidemu.card.models import Rule
+from pidemu.card.models import GENERAL_RULES, Rule
 from pidemu.errors import ScanError
 from pidemu.law import Law
 from pidemu.scan.build import build
@@ -76,9 +76,9 @@ def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None)
     kp = draw(gains)
     series = draw(st.booleans()) and kp != 0
     scheme: Scheme = windup if windup is not None else draw(st.sampled_from(POSITIONAL_SCHEMES))
-    rules = [Rule.BACKWARD, Rule.FORWARD] if scheme == "external-reset" else list(Rule)
+    rules = [Rule.BACKWARD, Rule.FORWARD] if scheme == "external-reset" else list(GENERAL_RULES)
     b = 0.0 if scheme == "clamp-sum" else draw(weights)
-    filter_rule = draw(st.sampled_from(Rule))
+    filter_rule = draw(st.sampled_from(GENERAL_RULES))
     fastest = 1.1 if order == 2 and filter_rule is Rule.FORWARD else 0.6  # in scans; the forward rule is stable above 1 and 1/2
     return Algorithm(
         series=series,
@@ -91,13 +91,13 @@ def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None)
         filter_on=place,
         filter_order=order,
         integral_rule=draw(st.sampled_from(rules)),
-        derivative_rule=draw(st.sampled_from(Rule)),
+        derivative_rule=draw(st.sampled_from(GENERAL_RULES)),
         filter_rule=filter_rule,
         windup=scheme,
         tracking_time=draw(st.floats(1, 100)),
         accumulated=b == 0 and (scheme == "clamp-sum" or draw(st.booleans())),
-        load_output=draw(st.booleans()),
-        restarted=draw(st.booleans()),
+        start=draw(st.sampled_from(["bumpless", "load-output"])),
+        derivative_start=draw(st.sampled_from(["running", "restarted"])),
     )
 
 
@@ -143,7 +143,7 @@ def test_the_impulse_response_of_any_positional_program_is_that_of_its_law(a: Al
 
 @given(a=algorithms(h=0.7))
 def test_the_impulse_response_of_any_velocity_program_is_that_of_its_law(a: Algorithm) -> None:
-    a = replace(a, velocity=True, windup="velocity", accumulated=False, load_output=False)
+    a = replace(a, velocity=True, windup="velocity", accumulated=False, start="bumpless")
     program = build(a, 0.7, limits=WIDE)
     for path in PATHS:
         assert_impulse(Law(a, 0.7).impulse(40, path), impulse(program, path, 40))
@@ -151,8 +151,8 @@ def test_the_impulse_response_of_any_velocity_program_is_that_of_its_law(a: Algo
 
 @pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
 @pytest.mark.parametrize("series", [False, True], ids=["parallel", "series"])
-@pytest.mark.parametrize("rule", list(Rule))
-@pytest.mark.parametrize("integral", list(Rule))
+@pytest.mark.parametrize("rule", GENERAL_RULES)
+@pytest.mark.parametrize("integral", GENERAL_RULES)
 @pytest.mark.parametrize(("place", "order"), [*FILTERS, ("none", 1)])
 @settings(max_examples=4)
 @given(
@@ -267,9 +267,9 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
 ) -> None:
     a = settings_of(data, pidemu.load_card(name)).algorithm(own_units=True)
     h = data.draw(scans_of(a))
-    if a.load_output or (a.ki == 0 and not a.velocity):  # these are bumped by P + D, as they are in the field
+    if a.start == "load-output" or (a.ki == 0 and not a.velocity):  # these are bumped by P + D, as they are in the field
         x = record(seed, modes=True)
-        u = run(build(replace(a, kp=0.0, kd=0.0, ki=0.0, load_output=True), h, initial_output=30.0), x)
+        u = run(build(replace(a, kp=0.0, kd=0.0, ki=0.0, start="load-output"), h, initial_output=30.0), x)
         assert all(u[n] == u[n - 1] for n in starts_in_automatic(x))
     else:
         assert_bumpless(a, h, seed)
@@ -281,7 +281,7 @@ def test_the_first_automatic_output_of_any_bumpless_program_is_the_last_manual_o
     windup: Scheme, data: st.DataObject, seed: int
 ) -> None:
     a = data.draw(algorithms(windup=windup))
-    assert_bumpless(replace(a, ki=a.ki or 0.1, load_output=False), 1.0, seed)
+    assert_bumpless(replace(a, ki=a.ki or 0.1, start="bumpless"), 1.0, seed)
 
 
 @given(a=algorithms(), seed=seeds)
@@ -292,7 +292,7 @@ def test_the_first_automatic_output_of_any_velocity_program_is_the_last_manual_o
 @pytest.mark.parametrize("windup", POSITIONAL_SCHEMES)
 @given(a=algorithms(), seed=seeds)
 def test_no_windup_scheme_moves_the_integral_of_a_proportional_controller(windup: Scheme, a: Algorithm, seed: int) -> None:
-    a = replace(a, ki=0.0, kd=0.0, Tf=0.0, b=1.0, windup=windup, accumulated=False, load_output=False)
+    a = replace(a, ki=0.0, kd=0.0, Tf=0.0, b=1.0, windup=windup, accumulated=False, start="bumpless")
     program = build(a, 1.0, limits=(0.0, 100.0))
     x = record(seed, modes=True)
     assert states_after(program, x).get("I", 0.0) == 0.0
@@ -326,7 +326,7 @@ DECAY = 50 * 0.98 ** np.arange(100_000.0)
 """A signal that decays through the denormal numbers to exactly zero, after about 37,000 scans."""
 
 
-@pytest.mark.parametrize("rule", list(Rule))
+@pytest.mark.parametrize("rule", GENERAL_RULES)
 @pytest.mark.parametrize(("place", "order"), FILTERS)
 @pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
 def test_states_decay_to_zero_and_not_to_denormal_numbers(rule: Rule, place: Place, order: Literal[1, 2], velocity: bool) -> None:
@@ -481,7 +481,7 @@ def by_velocity(c: Pid, x: Record) -> list[float]:
 REFERENCES: list[tuple[str, Scheme, Callable[[Pid, Record], list[float]], dict[str, Any]]] = [
     ("none", "none", by_none, {}),
     ("clamp", "clamp", by_clamp, {}),
-    ("clamp-sum", "clamp-sum", by_clamp_sum, {"b": 0.0, "accumulated": True, "load_output": True}),
+    ("clamp-sum", "clamp-sum", by_clamp_sum, {"b": 0.0, "accumulated": True, "start": "load-output"}),
     ("freeze", "freeze", by_freeze, {}),
     ("conditional", "conditional", by_conditional, {}),
     ("back-calculation", "back-calculation", by_back_calculation, {}),
@@ -554,7 +554,7 @@ def test_a_proportional_term_in_the_integral_sum_stays_where_there_is_no_integra
     a = Algorithm(series=False, kp=2.0, ki=0.0, kd=0.0, b=0.0, windup="clamp-sum", accumulated=True)
     x = record(6, amplitude=10.0)
     assert np.array_equal(
-        run(build(replace(a, load_output=True), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x)
+        run(build(replace(a, start="load-output"), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x)
     )
 
 

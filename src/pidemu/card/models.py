@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from datetime import date
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -59,14 +59,23 @@ class Form(StrEnum):
     PARALLEL = "parallel"
     STANDARD = "standard"
     SERIES = "series"
+    DAHLIN = "dahlin"
 
 
 class Rule(StrEnum):
-    """What replaces ``s`` when the equation is computed scan by scan."""
+    """What replaces ``s`` when the equation is computed scan by scan; the last three are rules of the derivative only."""
 
     BACKWARD = "backward"
     FORWARD = "forward"
     TRAPEZOIDAL = "trapezoidal"
+    EXACT = "exact"
+    LAGGED_DIFFERENCE = "lagged-difference"
+    FOUR_POINT = "four-point"
+
+
+GENERAL_RULES: Final = (Rule.BACKWARD, Rule.FORWARD, Rule.TRAPEZOIDAL)
+"""Rules of everything that is integrated or filtered."""
+GeneralRule = Literal[Rule.BACKWARD, Rule.FORWARD, Rule.TRAPEZOIDAL]
 
 
 class Status(StrEnum):
@@ -121,6 +130,74 @@ class Proportional(Model):
     )
 
 
+Reference = SettingName | Number
+"""A number, or the name of the setting that holds it."""
+
+
+class SignalFilter(Model):
+    """A first-order filter on a signal before the algorithm, `1/(1 + Tf s)`."""
+
+    time: Reference | None = Field(
+        default=None, description="Filter time: seconds, or the name of a setting. Exactly one of `time` and `factor`."
+    )
+    factor: Reference | None = Field(
+        default=None,
+        description="Share k of the new sample per scan, `f += k (x - f)`, from above 0 to 1 (no filter): a number, or the name of a "
+        "setting. The filter time goes with the scan interval, `Tf = h (1 - k)/k`.",
+    )
+    rule: GeneralRule = Field(default=Rule.BACKWARD, description="Scan rule.")
+
+
+class Measurement(Model):
+    """What is done to the measurement before the algorithm."""
+
+    filter: SignalFilter | None = Field(default=None, description="Filter on the measurement; P, I and D see what it lets through.")
+    previous_scan: Flag = Field(default=False, description="Whether the algorithm uses the measurement of the previous scan.")
+
+
+class Setpoint(Model):
+    """What is done to the setpoint before the algorithm."""
+
+    filter: SignalFilter | None = Field(default=None, description="Filter on the setpoint.")
+    rate: Reference | None = Field(
+        default=None, description="Fastest change of the setpoint that the algorithm sees: per second, or the name of a setting."
+    )
+    starts: Literal["setpoint", "zero"] = Field(
+        default="setpoint", description="Where the limited setpoint starts at power-up: at the setpoint, or at zero."
+    )
+    tracks: Flag = Field(
+        default=False,
+        description="Whether the setpoint follows the measurement in manual, and stays there after the transfer until the setpoint is "
+        "changed.",
+    )
+
+
+class ErrorShape(Model):
+    """What is done to the error before P and I use it (specs/equations.md, section 8)."""
+
+    filter: SignalFilter | None = Field(default=None, description="Filter on the error; P, I and D on error see what it lets through.")
+    shape: Literal["linear", "gap", "squared", "gain-linear"] = Field(
+        default="linear",
+        description="`linear`. `gap`: within `band` of zero the error counts with `gain`; with a gain of 0 that is a deadband. `squared`: "
+        "`e |e|/over`. `gain-linear`: `e (L + (1 - L) |e|/over)` with L = `linearity`.",
+    )
+    band: Reference | None = Field(default=None, description="Half width of the band [as the measurement], with `gap`.")
+    gain: Reference = Field(default=0.0, description="Gain within the band, with `gap`: a number, or the name of a setting.")
+    subtracted: Flag = Field(
+        default=False, description="With `gap`: outside the band the error is less by what the band took, so that nothing jumps at its edge."
+    )
+    zero_crossing: Flag = Field(
+        default=False, description="With `gap`: the band counts only after the error has changed its sign within it."
+    )
+    linearity: Reference | None = Field(default=None, description="L, with `gain-linear`: a number, or the name of a setting.")
+    over: Annotated[float, Field(gt=0, strict=True)] = Field(
+        default=100.0, description="The |e| at which `squared` and `gain-linear` have gain 1 [as the measurement]."
+    )
+    on: Literal["error", "proportional", "integral"] = Field(
+        default="error", description="What is shaped: the error of P and I alike, or of one of them."
+    )
+
+
 class WindupNone(Model):
     """The integral goes on whatever the output does."""
 
@@ -144,6 +221,39 @@ class WindupGate(Model):
         description="`freeze`: no integration that pushes further while the last output is at a limit. `conditional`: no "
         "integration while the output is beyond a limit and the increment would push it further."
     )
+    judged_on: Literal["output", "sum-without-derivative"] = Field(
+        default="output",
+        description="What `freeze` looks at, from the last scan: the output, or P + I before the derivative is added.",
+    )
+    direction: Literal["further", "both"] = Field(
+        default="further", description="With `freeze`: `both` stops the integral at a limit whichever way it would move."
+    )
+    test: Literal["increment", "error-times-output"] = Field(
+        default="increment",
+        description="What `conditional` takes for pushing further: the sign of the increment, or that of error times the sum before limits.",
+    )
+    fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
+        default=1.0,
+        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by this.",
+    )
+
+
+class WindupRecompute(Model):
+    """At a limit the integral is set to what the limit leaves for it."""
+
+    scheme: Literal["recompute"] = Field(description="Where the sum reaches a limit: `I = limit - P - D`, after the output.")
+    without_derivative: Flag = Field(
+        default=False, description="Whether the derivative is left out: `P + I` is held against the limits and `I = limit - P`."
+    )
+    clamped: Flag = Field(default=False, description="Whether the integral is limited to the output limits as well.")
+
+
+class WindupResetOutsideBand(Model):
+    """The integral is cleared while the measurement is outside the proportional band."""
+
+    scheme: Literal["reset-outside-band"] = Field(
+        description="`I = 0` while the proportional action alone, `kp |e|`, is larger than the output span."
+    )
 
 
 class WindupBackCalculation(Model):
@@ -153,6 +263,12 @@ class WindupBackCalculation(Model):
     tracking_time: SettingName | Number | Literal["Ti", "sqrt(Ti Td)"] = Field(
         description="Tracking time Tt: seconds, the name of a setting, `Ti`, or `sqrt(Ti Td)` (`Ti` where there is no derivative)."
     )
+    times: Literal["Ti"] | None = Field(
+        default=None, description="`Ti`: the number or setting under `tracking-time` is a multiple of the integral time."
+    )
+    when_off: Literal["Ti", "sqrt(Ti Td)"] | None = Field(
+        default=None, description="The tracking time taken where the setting under `tracking-time` has its off value."
+    )
 
 
 class WindupExternalReset(Model):
@@ -160,7 +276,12 @@ class WindupExternalReset(Model):
 
     scheme: Literal["external-reset"] = Field(
         description="The integral is a first-order lag, of the integral time, fed with the limited output less the other terms: it "
-        "stands still while the output stands at a limit. Backward and forward rules only."
+        "stands still while the output stands at a limit. Backward and forward rules only. An external reset signal takes the "
+        "place of the limited output."
+    )
+    fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
+        default=1.0,
+        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by this.",
     )
 
 
@@ -174,17 +295,44 @@ class WindupVelocity(Model):
 
 
 Windup = Annotated[
-    WindupNone | WindupClamp | WindupGate | WindupBackCalculation | WindupExternalReset | WindupVelocity,
+    WindupNone
+    | WindupClamp
+    | WindupGate
+    | WindupRecompute
+    | WindupBackCalculation
+    | WindupExternalReset
+    | WindupVelocity
+    | WindupResetOutsideBand,
     Field(discriminator="scheme"),
 ]
+
+
+class IntegralLimits(Model):
+    """Limits of the integral itself."""
+
+    high: Reference | Literal["output"] = Field(
+        description="Upper limit: a number, the name of a setting, or `output`: the output's own limit."
+    )
+    low: Reference | Literal["output"] | None = Field(default=None, description="Lower limit, likewise; by default the upper one negated.")
 
 
 class Integral(Model):
     """The integral term."""
 
     on: Literal["error", "none"] = Field(default="error", description="`error`, or `none`: no such term.")
-    rule: Rule = Field(
+    rule: GeneralRule = Field(
         description="Scan rule of the integral (specs/equations.md, section 4). `forward` adds this scan's error after the output."
+    )
+    holds: Literal["ki e", "e/Ti", "e"] = Field(
+        default="ki e",
+        description="What the state is the integral of: `ki e`, so that a changed setting does not bump; `e/Ti`, the gain applied "
+        "afterwards; or `e`, gain and integral time applied afterwards (specs/equations.md, section 6).",
+    )
+    limits: IntegralLimits | None = Field(
+        default=None, description="Limits of the state, in the units of what it holds, besides what `windup` does."
+    )
+    deadband: Reference | None = Field(
+        default=None, description="No integration while |e| is at most this [as the measurement]: a number, or the name of a setting."
     )
     windup: Windup = Field(description="What happens to the integral at an output limit (specs/equations.md, section 5).")
 
@@ -216,7 +364,7 @@ class Filter(Model):
         "derivative time of the "
         "equivalent standard form.",
     )
-    rule: Rule | None = Field(
+    rule: GeneralRule | None = Field(
         default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."
     )
 
@@ -234,22 +382,105 @@ class Derivative(Model):
     rule: Rule = Field(
         default=Rule.BACKWARD,
         description="Scan rule of the filtered derivative (specs/equations.md, section 4). Without a filter the "
-        "derivative is the backward difference.",
+        "derivative is the backward difference; `lagged-difference` has none without a filter, `four-point` has no filter.",
+    )
+    starts: Literal["sample", "zero"] = Field(
+        default="sample",
+        description="At power-up the previous signal is the first sample, so that nothing moves, or zero, so that the first scan kicks.",
     )
     filter: Filter | None = Field(default=None, description="The filter; none if absent.")
 
 
-class Transfer(Model):
-    """What happens when the controller is put into automatic."""
+class Cascade(Model):
+    """What is different in cascade, with a remote setpoint."""
 
-    start: Literal["bumpless", "load-output"] = Field(
+    proportional: Proportional = Field(description="The proportional term in cascade, in place of the one in automatic.")
+
+
+class Feedforward(Model):
+    """A feedforward input."""
+
+    summed: Literal["before-limits", "after-limits"] = Field(
+        description="Where the feedforward signal is added: to the sum before the output limits, or to the limited output, which is limited again."
+    )
+    gain: Reference = Field(default=1.0, description="Gain of the feedforward signal: a number, or the name of a setting.")
+
+
+class Transfer(Model):
+    """What happens when the controller is put into automatic, and in manual before that."""
+
+    start: Literal["bumpless", "load-output", "tracked", "keep", "zero", "running"] = Field(
         description="`bumpless`: the first automatic output equals the last output, `I = u - P - D`. `load-output`: the "
         "integral sum is "
-        "loaded with the last output and the terms come on top, a bump of `P + D`."
+        "loaded with the last output and the terms come on top, a bump of `P + D`. `tracked`: in manual the integral is set every scan "
+        "to what the output leaves for it, and the first automatic scan moves on from there. `keep`: the integral stands as it stood. "
+        "`zero`: it starts at zero. `running`: the algorithm runs on in manual, and only its output is not used."
     )
-    derivative: Literal["running", "restarted"] = Field(
+    derivative: Literal["running", "restarted", "zeroed", "preset"] = Field(
         default="running",
-        description="`running`: filters and differences go on in manual. `restarted`: they start afresh at the transfer.",
+        description="`running`: filters and differences go on in manual. `restarted`: they start afresh at the transfer. `zeroed`: at the "
+        "transfer the previous signal counts as zero, so that the derivative kicks. `preset`: in manual the history is the present "
+        "sample and the term is zero.",
+    )
+    without_integral: Literal["kept", "zero"] = Field(
+        default="kept",
+        description="With `load-output` and the integral switched off: the sum keeps what it was loaded with, or is zero.",
+    )
+    first_scan: Literal["integrates", "holds"] = Field(
+        default="integrates",
+        description="Whether the integral grows in the first automatic scan after `load-output`, `keep` or `zero`.",
+    )
+    loaded: Literal["limited", "as-it-is"] = Field(
+        default="limited", description="With `load-output`: whether the output is limited to the output limits before it is loaded."
+    )
+    power_up: Literal["transfer", "zero"] = Field(
+        default="transfer",
+        description="The very first scan, in automatic: a `transfer` from the initial output, or the integral begins at `zero`, "
+        "whatever the output was.",
+    )
+    manual_output: Literal["operator", "gain-times-operator", "zero"] = Field(
+        default="operator",
+        description="The output in manual: the operator's, that multiplied by the gain, or zero.",
+    )
+    changes: Literal["as-held", "bumpless"] = Field(
+        default="as-held",
+        description="A setting changed in automatic: the new setting acts on what the integral holds (`integral.holds`), or the integral is "
+        "set so that the output does not move.",
+    )
+
+
+class Faults(Model):
+    """What happens with signals that are not numbers and with scan intervals that are none."""
+
+    signal: Literal["hold", "propagate", "nan", "zero"] = Field(
+        default="hold",
+        description="Setpoint or measurement is NaN or infinite: `hold` the output, nothing is computed and the state stands still; "
+        "`propagate`: it is computed with; `nan`, `zero`: that is the output for this scan, and the state stands still.",
+    )
+    zero_interval: Literal["hold", "compute"] = Field(
+        default="hold", description="An interval of zero: nothing is done and the last output stands, or it is computed with."
+    )
+    negative_interval: Literal["hold", "refuse", "zero"] = Field(
+        default="hold", description="A negative interval: nothing is done, an error is raised, or it counts as zero."
+    )
+
+
+class Arithmetic(Model):
+    """How numbers are computed."""
+
+    type: Literal["float64", "float32", "integer"] = Field(
+        description="`float32`: every operation is rounded to 24 bits. `integer`: counts, with carried remainders (specs/equations.md, section 7)."
+    )
+    literals: Literal["float32", "float64"] = Field(
+        default="float32",
+        description="With `float32`: the width of the numbers written in the program; an operation with a `float64` literal is computed "
+        "in float64 until it is stored.",
+    )
+    counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
+        default=None, description="With `integer`: counts per percent of setpoint, measurement and output."
+    )
+    gain_counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
+        default=None, description="With `integer`: counts per unit of the gain."
     )
 
 
@@ -258,7 +489,9 @@ class Setting(Model):
 
     sets: Literal[
         "gain", "multiplier", "integral", "derivative", "filter-time", "filter-ratio", "filter-gain",
-        "proportional-weight", "derivative-weight", "tracking-time",
+        "proportional-weight", "derivative-weight", "tracking-time", "filter-factor", "integral-limit", "deadband", "gap-gain",
+        "linearity", "feedforward-gain", "bias", "output-rate", "setpoint-rate", "resolution", "process-gain", "process-time",
+        "process-delay", "closed-loop-time",
     ] = Field(description="What the dial sets (specs/equations.md, section 1).")  # fmt: skip
     unit: Text = Field(
         description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`."
@@ -309,6 +542,12 @@ class ActionExample(Model):
 class Action(Model):
     """Control action."""
 
+    fixed: Flag = Field(
+        default=False,
+        description="Whether there is no choice of action: the error is always the one under `reverse`, and the sign of the gain decides. With "
+        "`pv - sp` a negative gain is reverse acting.",
+    )
+
     reverse: Literal["sp - pv", "pv - sp"] = Field(
         default="sp - pv",
         description="The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` "
@@ -325,6 +564,10 @@ class Scan(Model):
     """Scan interval."""
 
     default: Text = Field(description="Interval used when none is given, such as `1 s`.")
+    interval: Literal["nominal", "measured"] = Field(
+        default="nominal",
+        description="What the equations use where scans come unevenly: the nominal interval, or the one measured since the last scan.",
+    )
 
 
 class Output(Model):
@@ -332,6 +575,15 @@ class Output(Model):
 
     limits: tuple[Number, Number] = Field(
         description="Output limits used when none are given: % of span, or engineering units with `signals: engineering`."
+    )
+    rate: Reference | None = Field(
+        default=None, description="Fastest change of the output [as the limits, per second]: a number, or the name of a setting."
+    )
+    deadband: Reference | None = Field(
+        default=None, description="The output moves only by more than this [as the limits]: a number, or the name of a setting."
+    )
+    resolution: Reference | None = Field(
+        default=None, description="Step of the output [as the limits], to the nearest: a number, or the name of a setting."
     )
 
 
@@ -356,7 +608,15 @@ class Example(Model):
     """Settings and what they amount to; a test runs every one."""
 
     given: dict[str, str | Number] = Field(description="Settings and options by name.")
-    canonical: Canonical = Field(description="The equivalent parallel gains of the feedback path, to six digits.")
+    canonical: Canonical | None = Field(
+        default=None,
+        description="The equivalent parallel gains of the feedback path, to six digits. At least one of `canonical` and `outputs`.",
+    )
+    outputs: list[Number] | None = Field(
+        default=None,
+        description="The output of the first automatic scans after a setpoint step of 1 from rest at 50, less the output before, at the "
+        "card's scan interval and without limits; to six digits.",
+    )
     source: Text | None = Field(
         default=None,
         description="Key of an entry under `sources`, where the example is printed; absent if it is our own arithmetic.",
@@ -374,19 +634,27 @@ class Equation(Model):
     )
     form: Form = Field(
         description="`parallel`: `kp + ki/s + kd s`. `standard` (ideal, ISA): `K (1 + 1/(Ti s) + Td s)`. `series` (interacting): "
-        "`K (1 + 1/(Ti s)) (1 + Td s)`."
+        "`K (1 + 1/(Ti s)) (1 + Td s)`. `dahlin`: pole cancellation, `D(z)` of a first-order process with dead time "
+        "(specs/equations.md, section 4)."
     )
     implementation: Literal["positional", "velocity"] = Field(
         description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the "
         "last limited output."
     )
+    setpoint: Setpoint | None = Field(default=None, description="What is done to the setpoint before the algorithm; nothing if absent.")
+    measurement: Measurement | None = Field(default=None, description="What is done to the measurement before it; nothing if absent.")
+    error: ErrorShape | None = Field(default=None, description="What is done to the error; nothing if absent.")
     proportional: Proportional = Field(description="The proportional term.")
+    cascade: Cascade | None = Field(default=None, description="What is different in cascade; nothing if absent.")
     integral: Integral = Field(description="The integral term.")
     derivative: Derivative = Field(description="The derivative term.")
+    feedforward: Feedforward | None = Field(default=None, description="Feedforward input; none if absent.")
     transfer: Transfer = Field(description="What happens when the controller is put into automatic.")
     action: Action = Field(description="Control action.")
     scan: Scan = Field(description="Scan interval.")
     output: Output = Field(description="Output.")
+    arithmetic: Arithmetic | None = Field(default=None, description="How numbers are computed; float64 if absent.")
+    faults: Faults | None = Field(default=None, description="Signals that are not numbers, intervals that are none; `hold` if absent.")
     settings: dict[SettingName, Setting] = Field(min_length=1, description="The dials, by the vendor's own names.")
 
 

@@ -103,7 +103,7 @@ def _notes(record: Record, controller: Controller, step: float | None, bias: flo
         if outside:
             yield f"in {outside} samples the manual output is outside the output limits; it is taken as it is"
     a = controller.settings.algorithm()
-    if not (a.ki or a.velocity or a.load_output or bias):
+    if not (a.ki or a.velocity or a.start == "load-output" or bias):
         yield "there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pidemu.algorithm import Algorithm
 from pidemu.card.models import Form
 from pidemu.conversion.target import Numbers, Target, TargetFilter
+from pidemu.errors import UndefinedError
 from pidemu.law import Law
 from pidemu.units import Role
 
@@ -69,7 +70,10 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     NoMatchError
         There are none.
     """
-    n0, n1, n2, d1, d2 = law.coefficients()
+    try:
+        n0, n1, n2, d1, d2 = law.coefficients()
+    except UndefinedError:
+        raise NoMatchError("the source has more filters than the target") from None
     shape, filt = target.shape, target.filter
     by_multiplier = target.form is Form.PARALLEL and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
     if not filt.free and not by_multiplier:

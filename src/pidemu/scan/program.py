@@ -91,6 +91,13 @@ class Select(Expr):
     no: Expr
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Floor(Expr):
+    """The largest whole number that is not above the operand."""
+
+    operand: Expr
+
+
 Operand = Expr | float | int
 
 
@@ -120,6 +127,22 @@ def names_in(x: Expr) -> Iterator[str]:
         case Binary(left=left, right=right):
             yield from names_in(left)
             yield from names_in(right)
+        case Floor(operand=operand):
+            yield from names_in(operand)
+
+
+def has_literal(x: Expr) -> bool:
+    """Tell whether an arithmetic operation of an expression has a number of the program text as operand."""
+    match x:
+        case Select(condition=condition, yes=yes, no=no):
+            return any(has_literal(part) for part in (condition, yes, no))
+        case Binary(operator="+" | "-" | "*" | "/", left=left, right=right):
+            return isinstance(left, Number) or isinstance(right, Number) or has_literal(left) or has_literal(right)
+        case Binary(left=left, right=right):
+            return has_literal(left) or has_literal(right)
+        case Floor(operand=operand):
+            return has_literal(operand)
+    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +192,8 @@ class Program:
     title : str
         Which controller.
     inputs : tuple of Quantity
-        Signals read each scan, in order: ``sp, pv, auto, manual``. ``manual`` is NaN where the operator has set nothing.
+        Signals read each scan, in order: ``sp, pv, auto, manual``, then those asked for. ``manual`` is NaN where the operator has set
+        nothing; so are ``cascade`` (remote setpoint), ``track`` (output to follow) and ``reset`` (external reset) where there is none.
     coefficients : tuple of Quantity
         Numbers fixed by settings and scan interval.
     values : tuple of float
@@ -182,6 +206,10 @@ class Program:
         The assignments, in order.
     output : str
         The name that holds the output when the scan ends.
+    precision : {"float64", "float32"}
+        What every operation is rounded to.
+    wide_literals : bool
+        With float32: numbers of the program text are float64, and so is what is computed with them until it is assigned.
     """
 
     title: str
@@ -192,3 +220,5 @@ class Program:
     initial: tuple[float, ...]
     body: tuple[Assign, ...]
     output: str = "u"
+    precision: Literal["float64", "float32"] = "float64"
+    wide_literals: bool = False

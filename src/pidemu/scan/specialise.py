@@ -6,14 +6,15 @@ order, so its bits are the same; only selects on what is known, copies and unuse
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from pidemu.scan.program import Assign, Binary, Expr, Name, Number, Program, Select, names_in
+from pidemu.scan.program import Assign, Binary, Expr, Floor, Name, Number, Program, Select, names_in
 
-IN_AUTOMATIC: Final[Mapping[str, float]] = {"auto": 1.0, "on": 1.0, "begun": 1.0}
+IN_AUTOMATIC: Final[Mapping[str, float]] = {"auto": 1.0, "track": math.nan, "on": 1.0, "begun": 1.0}
 """What holds from the second automatic scan on."""
 
 _COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
@@ -53,7 +54,7 @@ def specialise(program: Program, known: Mapping[str, float] = IN_AUTOMATIC) -> P
             live.update(names_in(assign.value))
             body.append(assign)
     body = _named_once(body[::-1], program.output)
-    inputs = tuple(q for q in program.inputs if q.name in ("sp", "pv"))
+    inputs = tuple(q for q in program.inputs if q.name not in known and q.name != "manual")
     return replace(program, inputs=inputs, body=tuple(body))
 
 
@@ -88,6 +89,8 @@ def _fold(x: Expr, environment: Mapping[str, Expr]) -> Expr:
             if op in ("and", "or"):
                 return _logical(op == "and", a, b)
             return Binary(op, a, b)
+        case Floor(operand=operand):
+            return Floor(_fold(operand, environment))
     return x
 
 

@@ -1,0 +1,50 @@
+"""Dahlin's pole-cancellation algorithm: a recursion on its own past outputs (section 4)."""
+
+from __future__ import annotations
+
+from pidemu.algorithm import Algorithm
+from pidemu.errors import ScanError
+from pidemu.scan import output
+from pidemu.scan.blocks import Builder
+from pidemu.scan.program import select
+from pidemu.scan.terms import Terms
+
+_LONGEST = 1000
+"""Scans of dead time beyond which the program would be absurdly long."""
+
+
+def dahlin(b: Builder, a: Algorithm, h: float, sign: float, t: Terms) -> None:
+    """Add ``u_n = q u_(n-1) + (1 - q) u_(n-N-1) + g (e_n - p e_(n-1))``, on limited outputs; bumpless at a transfer.
+
+    Written for increments, so that at rest nothing is left to rounding: ``u_n = u_(n-1) + (1 - q)(u_(n-N-1) - u_(n-1)) + ...``.
+
+    Raises
+    ------
+    ScanError
+        The dead time is more than a thousand scans.
+    """
+    assert a.dahlin is not None
+    g, p, q, delay = a.dahlin.numbers(h)
+    if delay > _LONGEST:
+        raise ScanError(f"the dead time is {delay} scans of {h:g} s, the most is {_LONGEST}; use a longer scan interval")
+    manual = output.by_hand(b, a, t.u)
+    last = output.kept(b, a, t.u)
+    past = [b.state(f"u{n}", f"output {n + 1} scans ago") for n in range(1, delay + 1)]
+    for state in past:
+        b.let(state.id, select(t.on, state, last), "at a transfer the history is the last output (section 6)")
+    e1 = b.state("e1", "error at the last scan")
+    gain, pole = b.coefficient("g", sign * g, "gain on the error", "%/%"), b.coefficient("p", p, "pole of the process", "-")
+    oldest = past[-1] if past else last
+    moved = gain * (t.w - pole * e1)
+    if past:
+        moved = b.coefficient("q_rest", 1 - q, "share of the output before the dead time", "-") * (oldest - last) + moved
+    du = b.let("du", select(t.on, moved, 0.0), "increment, pole cancellation (section 4); none at a transfer")
+    b.let("e1", t.w, "kept for the next scan")
+    v = b.let("v", last + du, "last output and increment")
+    for n in reversed(range(delay)):
+        b.let(past[n].id, past[n - 1] if n else last, "shift the history of outputs")
+    out = output.within_limits(b, a, h, t, v, last)
+    final = output.stepped(b, a, t, out)
+    if last is not t.u:
+        b.let(last.id, select(b.automatic, out, manual), "output as the algorithm knows it")
+    output.finish(b, final, manual)

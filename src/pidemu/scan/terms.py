@@ -1,0 +1,171 @@
+"""What every implementation starts from: the signals as the algorithm sees them, and the terms P and D (sections 2, 4 and 8)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pidemu.algorithm import Algorithm
+from pidemu.scan import blocks
+from pidemu.scan.blocks import Builder
+from pidemu.scan.program import Expr, Name, equal, select
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """Setpoint, measurement and error as the algorithm sees them.
+
+    Attributes
+    ----------
+    r, y, e : Expr
+        Setpoint, measurement and error, filtered.
+    shaped : Expr
+        The error as P and I use it.
+    cascade : Expr or None
+        Whether the loop is in cascade.
+    """
+
+    r: Expr
+    y: Expr
+    e: Expr
+    shaped: Expr
+    cascade: Expr | None
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """The expressions that positional and velocity implementation share.
+
+    Attributes
+    ----------
+    signals : Signals
+        What the terms act on.
+    P : Expr
+        Proportional term, without gain where the gain is applied to the sum.
+    D : Expr or None
+        Derivative term, likewise.
+    w : Expr
+        Signal of the integral.
+    low, high : Name
+        Output limits.
+    u : Name
+        Last output.
+    on : Expr
+        Whether the last scan was automatic.
+    fresh : Expr
+        Whether filters and differences start afresh.
+    """
+
+    signals: Signals
+    P: Expr
+    D: Expr | None
+    w: Expr
+    low: Name
+    high: Name
+    u: Name
+    on: Expr
+    fresh: Expr
+
+
+def terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initial_output: float) -> Terms:
+    """Filter the signals and compute P, D and the signal that the integral acts on (sections 2, 4 and 8)."""
+    low = b.coefficient("low", limits[0], "low output limit", "%")
+    high = b.coefficient("high", limits[1], "high output limit", "%")
+    u = b.state("u", "last output", "%", initial_output)
+    on = b.state("on", "automatic in the last scan", "-") > 0.0
+    fresh = equal(Name("on"), 0.0) if a.derivative_start == "restarted" else b.fresh
+    s = _signals(b, a, h, fresh)
+    outside = a.holds == "ki e"
+    gain = a.kp if outside else 1.0
+    if a.kp:
+        P: Expr = b.let("P", _proportional(b, a, s, gain, fresh), "proportional term" if outside else "proportional signal")
+    else:
+        P = b.let("P", 0.0, "no proportional term")
+    D = None
+    if a.kd:
+        D = _derivative(b, a, s, fresh, a.kd if outside else a.kd / a.kp, h)
+    w = s.e if a.shape is not None and a.shape.on == "proportional" else s.shaped
+    if a.series and D is not None and a.ki:
+        per_gain = b.coefficient("per_kp", 1 / a.kp, "1/kp", "-")
+        w = b.let("w", w + per_gain * D, "signal of the integral: series form (section 2)")
+    return Terms(s, P, D, w, low, high, u, on, fresh)
+
+
+def _signals(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Signals:
+    cascade = equal(Name("cascade"), Name("cascade")) & b.automatic if b.has("cascade") else None
+    y = _measurement(b, a, h, fresh)
+    r = _setpoint(b, a, h, fresh, y, cascade)
+    e: Expr = b.let("e", r - y, "error")
+    if a.e_filter is not None:
+        e = blocks.signal_lag(b, e, fresh, a.e_filter, h, "e")
+    shaped = e if a.shape is None else blocks.shaped(b, e, fresh, a.shape, "e")
+    return Signals(r, y, e, shaped, cascade)
+
+
+def _measurement(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Expr:
+    y: Expr = Name("pv")
+    if a.previous_pv:
+        last = b.state("pv1", "measurement of the previous scan")
+        late = b.let("pv_late", select(fresh, y, last), "measurement of the previous scan (section 4)")
+        b.let("pv1", y, "kept for the next scan")
+        y = late
+    if a.pv_filter is not None:
+        y = blocks.signal_lag(b, y, fresh, a.pv_filter, h, "pv")
+    if a.has_signal_filter and a.filter_on == "measurement":
+        y = blocks.lag(b, y, fresh, a.Tf, h, a.filter_rule, a.filter_order, "y")
+    return y
+
+
+def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, y: Expr, cascade: Expr | None) -> Expr:
+    """Return the setpoint as the algorithm sees it: remote or local, tracking, rate limit, filter (sections 6 and 8)."""
+    r: Expr = Name("sp")
+    if a.sp_tracks:
+        local, given = b.state("sp_own", "setpoint in force"), b.state("sp1", "setpoint given at the last scan")
+        stays = equal(r, given)
+        start = select(b.fresh, r, select(stays, local, r))
+        b.let(local.id, select(b.automatic, start, Name("pv")), "setpoint: follows the measurement in manual, stays until it is changed (section 6)")
+        b.let(given.id, r, "kept for the next scan")
+        r = local
+    if cascade is not None:
+        r = b.let("r", select(cascade, Name("cascade"), r), "in cascade the remote setpoint (section 6)")
+    if math.isfinite(a.sp_rate):
+        last = b.state("r1", "limited setpoint of the last scan")
+        if not a.sp_from_zero:
+            b.let(last.id, select(b.fresh, r, last), "start at the first setpoint")
+        reach = b.coefficient("r_reach", a.sp_rate * h, "fastest change of the setpoint in one scan", "%")
+        r = b.let(last.id, blocks.towards(r, last, reach), "setpoint rate limit (section 8)")
+    if a.sp_filter is not None:
+        r = blocks.signal_lag(b, r, fresh, a.sp_filter, h, "sp")
+    return r
+
+
+def _weighted(b: Builder, weight: float, name: str, s: Signals) -> Expr:
+    """Return ``weight*r - y``; the weight is not 0."""
+    return s.e if weight == 1 else b.coefficient(name, weight, "setpoint weight", "-") * s.r - s.y
+
+
+def proportional_signal(b: Builder, a: Algorithm, s: Signals, fresh: Expr) -> Expr:
+    """Return what P acts on, signed as ``b r - y`` (sections 2 and 8)."""
+    weight = 1.0 if a.e_filter is not None else a.b
+    x: Expr = 0.0 - s.y if weight == 0 else _weighted(b, weight, "b", s)
+    if a.shape is not None and a.shape.on != "integral" and weight == 1:
+        x = s.shaped
+    elif a.shape is not None and a.shape.on != "integral" and weight != 0:
+        x = blocks.shaped(b, b.let("x_P", x, "signal of P"), fresh, a.shape, "e_P")
+    if a.cascade_b is not None and s.cascade is not None:
+        other = 0.0 - s.y if a.cascade_b == 0 else _weighted(b, a.cascade_b, "b_cascade", s)
+        x = b.let("x_P", select(s.cascade, other, x), "signal of P: another structure in cascade (section 6)")
+    return x
+
+
+def _proportional(b: Builder, a: Algorithm, s: Signals, gain: float, fresh: Expr) -> Expr:
+    if a.b == 0 and (a.cascade_b is None or s.cascade is None):
+        return b.coefficient("minus_kp", -gain, "proportional gain on PV, signed for action", "%/%") * s.y
+    x = proportional_signal(b, a, s, fresh)
+    return x if gain == 1 and a.holds != "ki e" else b.coefficient("kp", gain, "proportional gain, signed for action", "%/%") * x
+
+
+def _derivative(b: Builder, a: Algorithm, s: Signals, fresh: Expr, gain: float, h: float) -> Expr:
+    x, kd = (s.y, -gain) if a.c == 0 else (_weighted(b, a.c, "c", s), gain)
+    x = x if isinstance(x, Name) else b.let("x", x, "signal of the derivative")
+    return blocks.derivative(b, x, fresh, a, kd, a.Tf if a.has_term_filter else 0.0, h)
