@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,20 @@ _SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
     Role.PROPORTIONAL_WEIGHT: st.sampled_from([0.0, 1.0]) | st.floats(0.01, 1),
     Role.DERIVATIVE_WEIGHT: st.sampled_from([0.0, 1.0]) | st.floats(0.01, 1),
     Role.TRACKING_TIME: st.floats(1, 3000),
+    Role.FILTER_FACTOR: st.just(1.0) | st.floats(0.1, 1),
+    Role.INTEGRAL_LIMIT: st.floats(5, 500),
+    Role.DEADBAND: st.just(0.0) | st.floats(0.1, 10),
+    Role.GAP_GAIN: st.floats(0, 1),
+    Role.LINEARITY: st.just(1.0) | st.floats(0.1, 1),
+    Role.FEEDFORWARD_GAIN: st.floats(0, 2),
+    Role.BIAS: st.floats(0, 100),
+    Role.OUTPUT_RATE: st.floats(0.1, 100),
+    Role.SETPOINT_RATE: st.floats(0.1, 100),
+    Role.RESOLUTION: st.floats(0.01, 1),
+    Role.PROCESS_GAIN: st.floats(0.1, 10),
+    Role.PROCESS_TIME: st.floats(1, 600),
+    Role.PROCESS_DELAY: st.floats(0, 60),
+    Role.CLOSED_LOOP_TIME: st.floats(1, 600),
 }
 """Canonical values by role (specs/equations.md, section 1)."""
 
@@ -59,6 +74,8 @@ def dial_values(draw: st.DrawFn, setting: Setting) -> float:
     value = from_canonical(role, draw(_SENSIBLE[role]), parse_unit(setting.unit))
     low, high = limits(setting)
     value = min(max(value, low), high)
+    if setting.resolution is not None:
+        value = min(max(round(value / setting.resolution) * setting.resolution, low), high)
     if math.isinf(value) and value not in off:  # a derivative of zero has no value on a dial that cannot show it
         value = from_canonical(role, 1.0, parse_unit(setting.unit))
     return value
@@ -91,12 +108,32 @@ def settings_of(data: st.DataObject, card: Card) -> Settings:
     return card.settings(data.draw(dials_of(card.id)))
 
 
+def linear(a: Algorithm) -> Algorithm:
+    """Return the algorithm without what the linear law leaves out."""
+    return replace(
+        a,
+        precision="float64",
+        shape=None,
+        integral_deadband=None,
+        integral_limits=None,
+        sp_rate=math.inf,
+        output_rate=math.inf,
+        output_deadband=0.0,
+        resolution=0.0,
+        bias=0.0,
+    )
+
+
 @st.composite
 def scans_of(draw: st.DrawFn, algorithm: Algorithm) -> float:
     """A scan interval [s]; with a rule that rings or is unstable where the filter is faster than the scan, one below its time."""
     rules = (algorithm.derivative_rule, algorithm.filter_rule)
-    rings = algorithm.Tf and any(rule is not Rule.BACKWARD for rule in rules)
+    rings = algorithm.Tf and any(rule in (Rule.FORWARD, Rule.TRAPEZOIDAL) for rule in rules)
     highest = min(10.0, algorithm.Tf) if rings else 10.0
+    if algorithm.precision == "integer":
+        return draw(st.integers(1, 100)) / 10
+    if algorithm.dahlin is not None:
+        return draw(st.floats(max(0.05, algorithm.dahlin.delay / 30), 10))
     return draw(st.floats(min(0.05, highest / 2), highest))
 
 

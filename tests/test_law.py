@@ -387,14 +387,18 @@ def test_the_discrete_law_is_that_of_the_difference_equations(
 @pytest.mark.parametrize("name", pidemu.cards())
 @given(data=st.data())
 def test_the_discrete_law_of_every_card_tends_to_its_continuous_law(name: str, data: st.DataObject) -> None:
-    given_settings = settings_of(data, pidemu.load_card(name))
-    a = given_settings.algorithm()
     w, h = np.array([0.01]), 0.01
+    given_settings = settings_of(data, pidemu.load_card(name))
+    a = given_settings.algorithm(scan=h)  # a filter that is set as a share per scan has its time from the interval
+    if a.dahlin is not None:
+        return  # it has no continuous law
     assume(not a.Tf or a.Tf > h)  # the forward rule is unstable otherwise
     cross = abs(a.ki * a.derivative_per_gain) if a.series else 0.0
     scale = abs(a.kp) + abs(a.ki) / w + abs(a.kd) * w + cross
+    if a.derivative_rule is Rule.LAGGED_DIFFERENCE and a.kd:
+        scale = scale + 1e4 * abs(a.kd) * w * h / a.Tf  # this rule's derivative is short by h/Tf of itself
     for path in PATHS:
-        difference = np.abs(given_settings.law().response(w, path) - given_settings.law(scan=h).response(w, path))
+        difference = np.abs(Law(a).response(w, path) - given_settings.law(scan=h).response(w, path))
         assert np.all(difference <= 2e-4 * scale)  # one scan is 1e-4 rad here: every s is off by up to that much of itself
 
 

@@ -226,14 +226,17 @@ def _lag(read: _Reader, filt: SignalFilter | None, h: float) -> Lag | None:
     return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
 
 
-def _shape(read: _Reader, error: ErrorShape | None) -> Shape | None:
+def _shape(read: _Reader, equation: Equation) -> Shape | None:
+    """Return what is done to the error, or ``None`` where that is nothing; P on the measurement itself is no error."""
+    error = equation.error
     if error is None or error.shape == "linear":
         return None
     band, linearity = read.pick(error.band, 0.0), read.pick(error.linearity, 1.0)
     if (error.shape == "gap" and not band) or (error.shape == "gain-linear" and linearity == 1):
         return None
     gain = read.value(error.gain) if isinstance(error.gain, str) else error.gain
-    return Shape(error.shape, band, gain, error.subtracted, error.zero_crossing, linearity, error.over, error.on)
+    on = "integral" if error.on == "error" and equation.proportional.on == "pv" else error.on
+    return Shape(error.shape, band, gain, error.subtracted, error.zero_crossing, linearity, error.over, on)
 
 
 def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
@@ -249,7 +252,7 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
         "pv_filter": _lag(read, pv and pv.filter, h),
         "previous_pv": pv is not None and pv.previous_scan,
         "e_filter": _lag(read, error and error.filter, h),
-        "shape": _shape(read, error),
+        "shape": _shape(read, equation),
         "cascade_b": None if other_b == b else other_b,
         "feedforward": None if ff is None else read.pick(ff.gain, 0.0),
         "feedforward_after": ff is not None and ff.summed == "after-limits",

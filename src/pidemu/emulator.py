@@ -6,7 +6,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from pidemu.canonical import default_scan
 from pidemu.card.models import Faults
-from pidemu.errors import ScanError
+from pidemu.errors import ScanError, suggest
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
@@ -199,6 +199,37 @@ class Controller:
         self._mode, self._count, self._last = "power-up", 0, ()
         self.events.clear()
 
+    def start(self, **states: float) -> None:
+        """Set what the program keeps from scan to scan, before the first scan.
+
+        Nothing else is touched: the other states stay where they are before the first scan, most at zero. The first scan is a transfer
+        from the output ``u``, which sets the integral anew. With ``I`` it is not: the controller goes on as if it had been running in
+        automatic, ``on`` and ``begun`` are 1 where the program has them, and what is kept of signals and filters should be given too.
+        All states of another controller, ``start(**other.state)``, let this one go on where that one is.
+
+        Parameters
+        ----------
+        **states
+            Values by the names that `state` shows.
+
+        Raises
+        ------
+        ScanError
+            There has been a scan, the program has no such state, or a value is not a finite number.
+        """
+        names = [q.name for q in self.program.states]
+        if self._count:
+            raise ScanError(f"states are set before the first scan, and there have been {self._count}; reset() first")
+        for name, value in states.items():
+            if name not in names:
+                raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
+            if not math.isfinite(value):
+                raise ScanError(f"the state {name} = {value} is not a finite number")
+        running = {name: 1.0 for name in ("on", "begun") if "I" in states and name in names}
+        for name, value in {**running, **states}.items():
+            kind = type(self._compiled.initial[names.index(name)])  # float, or what the program rounds to
+            self._state[names.index(name)] = kind(value)
+
     def change(self, settings: Settings | Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Change settings while running, as the real controller takes it (specs/equations.md, section 6).
 
@@ -237,7 +268,7 @@ class Controller:
         self._carry(state)
         if self._last:
             if new.algorithm().bumpless_changes and self._mode in ("automatic", "cascade"):
-                self._keep_output(old, new)
+                self._keep_output(before, state)
             expected = compiled_before.scan([state[q.name] for q in before.states], *self._last)
             bump = float(self._compiled.scan(list(self._state), *self._last)) - float(expected)
             what = ", ".join(f"{n} = {v.value:g}" for n, v in new.items() if n not in old or old[n].value != v.value)
@@ -254,14 +285,12 @@ class Controller:
             self._compiled.scan(fresh, *(named.get(q.name, math.nan) for q in self.program.inputs))
         self._state = [state.get(q.name, float(x)) for q, x in zip(self.program.states, fresh, strict=True)]
 
-    def _keep_output(self, old: Settings, new: Settings) -> None:
-        """Move the integral by what the proportional term is less, at the last signals (the listing's parameter change)."""
+    def _keep_output(self, before: Program, state: Mapping[str, float]) -> None:
+        """Move the integral by what the proportional term becomes less, at the last signals: the listing's parameter change."""
         places = {q.name: i for i, q in enumerate(self.program.states)}
-        if "I" in places:
-            sp, pv = self._last[:2]
-            terms = [a.kp * (a.b * sp - pv) for a in (old.algorithm(own_units=True), new.algorithm(own_units=True))]
-            sign = 1.0 if self._action == "reverse" else -1.0
-            self._state[places["I"]] += sign * (terms[0] - terms[1])
+        if "I" in places and "P" in {assign.name for assign in before.body} & {assign.name for assign in self.program.body}:
+            old = _value("P", before, [state[q.name] for q in before.states], self._last)
+            self._state[places["I"]] += old - _value("P", self.program, list(self._state), self._last)
 
     def scan(
         self,
@@ -526,6 +555,13 @@ class Controller:
     def _quiet(self) -> contextlib.AbstractContextManager[Any]:
         """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
         return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
+
+
+def _value(name: str, program: Program, state: list[float], inputs: tuple[float, ...]) -> float:
+    """Return what a program computes under a name in one scan."""
+    from pidemu.targets.python import compiled
+
+    return float(compiled(replace(program, output=name)).scan(state, *inputs))
 
 
 def _absent(signal: str) -> float:

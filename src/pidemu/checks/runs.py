@@ -62,11 +62,11 @@ def _plausible(variant: Variant) -> Settings:
     values: dict[str, object] = dict(variant.chosen)
     for name, s in variant.equation.settings.items():
         if is_active(variant.equation, name, s) and (s.default is None or s.default in off_values(s)):
-            values[name] = _working(*limits(s))
+            values[name] = working(*limits(s))
     return variant.card.settings(values)
 
 
-def _working(low: float, high: float) -> float:
+def working(low: float, high: float) -> float:
     """Return a value inside a range: 1 where that fits, else something in the middle."""
     if low <= 1 <= high:
         return 1.0

@@ -36,11 +36,12 @@ EXTRA_INPUTS: Final = {
 
 
 class Builder:
-    """Collects a program's parts in order."""
+    """Collects a program's parts in order; `sign` is -1 for direct action."""
 
-    def __init__(self, title: str, signals: Sequence[str] = ()) -> None:
+    def __init__(self, title: str, signals: Sequence[str] = (), sign: float = 1.0) -> None:
         self.title = title
         self.signals = signals
+        self.sign = sign
         self._coefficients: dict[str, tuple[Quantity, float]] = {}
         self._states: dict[str, tuple[Quantity, float]] = {}
         self._body: list[Assign] = []
@@ -151,7 +152,7 @@ def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
     band = b.coefficient("band", s.band, "half width of the band", "%")
     inside = size <= band
     if s.zero_crossing:
-        crossed, e1 = b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"), b.state(f"{what}1", "last error")
+        crossed, e1 = b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"), b.state(f"{what}_was", "last error")
         before = select(afresh, e, e1)
         seen = (crossed > 0.0) | (e * before <= 0.0)
         b.let(crossed.id, select(inside & seen, 1.0, 0.0), "zero crossing (section 8)")

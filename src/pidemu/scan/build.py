@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
+import numpy as np
+
 from pidemu.algorithm import Algorithm, check_filters
 from pidemu.card.models import Rule
 from pidemu.errors import ScanError
@@ -65,8 +67,9 @@ def build(
     _check(algorithm, scan, limits, bias, initial_output, signals)
     sign = 1.0 if action == "reverse" else -1.0
     a = replace(algorithm, kp=sign * algorithm.kp, ki=sign * algorithm.ki, kd=sign * algorithm.kd)
-    b = Builder(title, signals)
-    common = terms(b, a, scan, limits, initial_output)
+    b = Builder(title, signals, sign)
+    own_terms = replace(a, kp=0.0, kd=0.0) if a.precision == "integer" else a  # counts have terms of their own
+    common = terms(b, own_terms, scan, _representable(limits, a), initial_output)
     if a.dahlin is not None:
         dahlin(b, a, scan, sign, common)
     elif a.precision == "integer":
@@ -76,6 +79,18 @@ def build(
     else:
         positional(b, a, scan, common, bias or (0.0 if a.ki else a.bias))
     return b.program(a)
+
+
+def _representable(limits: tuple[float, float], a: Algorithm) -> tuple[float, float]:
+    """Return the limits as the program's numbers can hold them, never outside those given."""
+    if a.precision != "float32":
+        return limits
+    low, high = (np.float32(x) for x in limits)
+    if float(low) < limits[0]:
+        low = np.nextafter(low, np.float32(math.inf))
+    if float(high) > limits[1]:
+        high = np.nextafter(high, np.float32(-math.inf))
+    return float(low), float(high)
 
 
 def _check(

@@ -56,7 +56,7 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     moved = b.let("dM", kp * blocks.summed(parts), "increment of the output sum")
     b.let("M", select(t.on, total + moved, total), "no increment at a transfer, bumpless (section 6)")
     b.let("M", blocks.limited(total, t.low * counts * fine, t.high * counts * fine), "output limits (section 5)")
-    out = b.let("out", Floor(total / fine) / counts, "output in whole counts")
+    out = b.let("out", blocks.limited(Floor(total / fine) / counts, t.low, t.high), "output in whole counts")
     output.finish(b, out, manual)
 
 

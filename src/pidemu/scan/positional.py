@@ -147,7 +147,7 @@ def _gated(
         ahead = state if a.integral_rule is Rule.FORWARD else state + grown
         v0 = b.let("v0", scheme.output(blocks.summed([P, scheme.term(ahead), t.D])), "sum with this increment")
         if a.gate.by_output_sign:
-            stop = blocks.saturated_by_sign(v0, t.low, t.high, t.signals.e)
+            stop = blocks.saturated_by_sign(v0, t.low, t.high, t.signals.e if b.sign > 0 else 0.0 - t.signals.e)
         else:
             stop = blocks.saturated(v0, t.low, t.high, pushes)
         return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")

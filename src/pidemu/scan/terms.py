@@ -75,10 +75,9 @@ def terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initi
     on = b.state("on", "automatic in the last scan", "-") > 0.0
     fresh = equal(Name("on"), 0.0) if a.derivative_start == "restarted" else b.fresh
     s = _signals(b, a, h, fresh)
-    outside = a.holds == "ki e"
-    gain = a.kp if outside else 1.0
+    outside = a.holds == "ki e" or a.velocity
     if a.kp:
-        P: Expr = b.let("P", _proportional(b, a, s, gain, fresh), "proportional term" if outside else "proportional signal")
+        P: Expr = b.let("P", _proportional(b, a, s, outside, fresh), "proportional term" if outside else "proportional signal")
     else:
         P = b.let("P", 0.0, "no proportional term")
     D = None
@@ -97,7 +96,7 @@ def _signals(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Signals:
     r = _setpoint(b, a, h, fresh, y, cascade)
     e: Expr = b.let("e", r - y, "error")
     if a.e_filter is not None:
-        e = blocks.signal_lag(b, e, fresh, a.e_filter, h, "e")
+        e = blocks.signal_lag(b, e, fresh, a.e_filter, h, "e_in")
     shaped = e if a.shape is None else blocks.shaped(b, e, fresh, a.shape, "e")
     return Signals(r, y, e, shaped, cascade)
 
@@ -105,14 +104,14 @@ def _signals(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Signals:
 def _measurement(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Expr:
     y: Expr = Name("pv")
     if a.previous_pv:
-        last = b.state("pv1", "measurement of the previous scan")
+        last = b.state("pv_was", "measurement of the previous scan")
         late = b.let("pv_late", select(fresh, y, last), "measurement of the previous scan (section 4)")
-        b.let("pv1", y, "kept for the next scan")
+        b.let("pv_was", y, "kept for the next scan")
         y = late
     if a.pv_filter is not None:
-        y = blocks.signal_lag(b, y, fresh, a.pv_filter, h, "pv")
+        y = blocks.signal_lag(b, y, fresh, a.pv_filter, h, "pv_in")
     if a.has_signal_filter and a.filter_on == "measurement":
-        y = blocks.lag(b, y, fresh, a.Tf, h, a.filter_rule, a.filter_order, "y")
+        y = blocks.lag(b, y, fresh, a.Tf, h, a.filter_rule, a.filter_order, "pv")
     return y
 
 
@@ -135,7 +134,7 @@ def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, y: Expr, cascade:
         reach = b.coefficient("r_reach", a.sp_rate * h, "fastest change of the setpoint in one scan", "%")
         r = b.let(last.id, blocks.towards(r, last, reach), "setpoint rate limit (section 8)")
     if a.sp_filter is not None:
-        r = blocks.signal_lag(b, r, fresh, a.sp_filter, h, "sp")
+        r = blocks.signal_lag(b, r, fresh, a.sp_filter, h, "sp_in")
     return r
 
 
@@ -150,7 +149,7 @@ def proportional_signal(b: Builder, a: Algorithm, s: Signals, fresh: Expr) -> Ex
     x: Expr = 0.0 - s.y if weight == 0 else _weighted(b, weight, "b", s)
     if a.shape is not None and a.shape.on != "integral" and weight == 1:
         x = s.shaped
-    elif a.shape is not None and a.shape.on != "integral" and weight != 0:
+    elif a.shape is not None and a.shape.on != "integral":
         x = blocks.shaped(b, b.let("x_P", x, "signal of P"), fresh, a.shape, "e_P")
     if a.cascade_b is not None and s.cascade is not None:
         other = 0.0 - s.y if a.cascade_b == 0 else _weighted(b, a.cascade_b, "b_cascade", s)
@@ -158,11 +157,13 @@ def proportional_signal(b: Builder, a: Algorithm, s: Signals, fresh: Expr) -> Ex
     return x
 
 
-def _proportional(b: Builder, a: Algorithm, s: Signals, gain: float, fresh: Expr) -> Expr:
-    if a.b == 0 and (a.cascade_b is None or s.cascade is None):
+def _proportional(b: Builder, a: Algorithm, s: Signals, outside: bool, fresh: Expr) -> Expr:
+    gain = a.kp if outside else 1.0
+    shaped = a.shape is not None and a.shape.on != "integral"
+    if a.b == 0 and not shaped and (a.cascade_b is None or s.cascade is None):
         return b.coefficient("minus_kp", -gain, "proportional gain on PV, signed for action", "%/%") * s.y
     x = proportional_signal(b, a, s, fresh)
-    return x if gain == 1 and a.holds != "ki e" else b.coefficient("kp", gain, "proportional gain, signed for action", "%/%") * x
+    return x if not outside else b.coefficient("kp", gain, "proportional gain, signed for action", "%/%") * x
 
 
 def _derivative(b: Builder, a: Algorithm, s: Signals, fresh: Expr, gain: float, h: float) -> Expr:
