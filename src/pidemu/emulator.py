@@ -174,7 +174,9 @@ class Controller:
                 self._others.clear()
             program = self._program(h)
             if [q.name for q in program.states] != [q.name for q in self.program.states]:
-                raise ScanError(f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running")
+                raise ScanError(
+                    f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
+                )
             found = self._others[h] = compiled(program, like=(self.program, self._compiled))
         return found
 
@@ -501,7 +503,10 @@ class Controller:
         signals = dict(zip(columns, _broadcast(list(columns.values())), strict=True))
         if "feedforward" in signals:
             signals["feedforward"] = np.where(np.isnan(signals["feedforward"]), 0.0, signals["feedforward"])
-        for name, bad in (("the mode is not a number", np.isnan(signals["auto"])), ("the manual output is infinite", np.isinf(signals["manual"]))):
+        for name, bad in (
+            ("the mode is not a number", np.isnan(signals["auto"])),
+            ("the manual output is infinite", np.isinf(signals["manual"])),
+        ):
             if bad.any():
                 raise ScanError(f"{name} in sample {np.flatnonzero(bad)[0]} (counted from 0)")
         return self._run(signals, measured=interval is not None and self.settings.equation.scan.interval == "measured")

@@ -259,7 +259,9 @@ def starts_in_automatic(x: Record) -> list[int]:
 def assert_bumpless(a: Algorithm, h: float, seed: int) -> None:
     x = record(seed, modes=True)
     u = run(build(a, h, limits=(0.0, 100.0), initial_output=30.0), x)
-    scale = largest_term(a, h, x) + 1e12 * (a.precision == "integer") / a.counts  # whole counts; I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest
+    scale = (
+        largest_term(a, h, x) + 1e12 * (a.precision == "integer") / a.counts
+    )  # whole counts; I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest
     for n in starts_in_automatic(x):
         assert abs(u[n] - u[n - 1]) <= 1e-12 * scale
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from pidemu.settings import Settings
 
 _REPLACED_WHOLE = ("filter", "windup")
+_SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
+_SCAN_BY_SCAN_KEYS = ("rule", "windup", "holds", "limits", "deadband", "rate", "starts", "tracks", "previous-scan")
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
 
@@ -101,9 +103,7 @@ class Statement:
     def makes_the_law(self) -> bool:
         """Whether the linear law depends on it; the rest matters scan by scan, at limits and at transfers only."""
         head, *rest = self.path.split(".")
-        return (
-            head not in ("implementation", "transfer", "action", "scan", "output") and "rule" not in rest and "windup" not in rest
-        )
+        return head not in _SCAN_BY_SCAN and not any(key in _SCAN_BY_SCAN_KEYS for key in rest)
 
     def __str__(self) -> str:
         note = f" ({self.evidence.note})" if self.evidence is not None and self.evidence.note else ""

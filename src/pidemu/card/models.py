@@ -175,7 +175,9 @@ class Setpoint(Model):
 class ErrorShape(Model):
     """What is done to the error before P and I use it (specs/equations.md, section 8)."""
 
-    filter: SignalFilter | None = Field(default=None, description="Filter on the error; P, I and D on error see what it lets through.")
+    filter: SignalFilter | None = Field(
+        default=None, description="Filter on the error; P, I and D on error see what it lets through."
+    )
     shape: Literal["linear", "gap", "squared", "gain-linear"] = Field(
         default="linear",
         description="`linear`. `gap`: within `band` of zero the error counts with `gain`; with a gain of 0 that is a deadband. `squared`: "
@@ -184,7 +186,8 @@ class ErrorShape(Model):
     band: Reference | None = Field(default=None, description="Half width of the band [as the measurement], with `gap`.")
     gain: Reference = Field(default=0.0, description="Gain within the band, with `gap`: a number, or the name of a setting.")
     subtracted: Flag = Field(
-        default=False, description="With `gap`: outside the band the error is less by what the band took, so that nothing jumps at its edge."
+        default=False,
+        description="With `gap`: outside the band the error is less by what the band took, so that nothing jumps at its edge.",
     )
     zero_crossing: Flag = Field(
         default=False, description="With `gap`: the band counts only after the error has changed its sign within it."
@@ -313,7 +316,9 @@ class IntegralLimits(Model):
     high: Reference | Literal["output"] = Field(
         description="Upper limit: a number, the name of a setting, or `output`: the output's own limit."
     )
-    low: Reference | Literal["output"] | None = Field(default=None, description="Lower limit, likewise; by default the upper one negated.")
+    low: Reference | Literal["output"] | None = Field(
+        default=None, description="Lower limit, likewise; by default the upper one negated."
+    )
 
 
 class Integral(Model):
@@ -332,7 +337,8 @@ class Integral(Model):
         default=None, description="Limits of the state, in the units of what it holds, besides what `windup` does."
     )
     deadband: Reference | None = Field(
-        default=None, description="No integration while |e| is at most this [as the measurement]: a number, or the name of a setting."
+        default=None,
+        description="No integration while |e| is at most this [as the measurement]: a number, or the name of a setting.",
     )
     windup: Windup = Field(description="What happens to the integral at an output limit (specs/equations.md, section 5).")
 
@@ -641,8 +647,12 @@ class Equation(Model):
         description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the "
         "last limited output."
     )
-    setpoint: Setpoint | None = Field(default=None, description="What is done to the setpoint before the algorithm; nothing if absent.")
-    measurement: Measurement | None = Field(default=None, description="What is done to the measurement before it; nothing if absent.")
+    setpoint: Setpoint | None = Field(
+        default=None, description="What is done to the setpoint before the algorithm; nothing if absent."
+    )
+    measurement: Measurement | None = Field(
+        default=None, description="What is done to the measurement before it; nothing if absent."
+    )
     error: ErrorShape | None = Field(default=None, description="What is done to the error; nothing if absent.")
     proportional: Proportional = Field(description="The proportional term.")
     cascade: Cascade | None = Field(default=None, description="What is different in cascade; nothing if absent.")
@@ -654,7 +664,9 @@ class Equation(Model):
     scan: Scan = Field(description="Scan interval.")
     output: Output = Field(description="Output.")
     arithmetic: Arithmetic | None = Field(default=None, description="How numbers are computed; float64 if absent.")
-    faults: Faults | None = Field(default=None, description="Signals that are not numbers, intervals that are none; `hold` if absent.")
+    faults: Faults | None = Field(
+        default=None, description="Signals that are not numbers, intervals that are none; `hold` if absent."
+    )
     settings: dict[SettingName, Setting] = Field(min_length=1, description="The dials, by the vendor's own names.")
 
 

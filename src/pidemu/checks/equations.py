@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.load import Variant, dotted, variants
-from pidemu.card.models import Equation
+from pidemu.card.models import GENERAL_RULES, Equation, WindupBackCalculation, WindupGate
 from pidemu.card.source import Path_
 from pidemu.errors import PidemuError, Problem, suggest
 from pidemu.settings import limits, off_values
@@ -21,6 +21,40 @@ _NEUTRAL: Final = {
     "filter-ratio": 0.0,
     "derivative": 0.0,
 }
+
+_BY_ROLE: Final = (
+    "gain", "multiplier", "integral", "derivative", "bias", "process-gain", "process-time", "process-delay", "closed-loop-time",
+)  # fmt: skip
+"""Roles that need no field to name them."""
+_WORDS: Final = {"tracking-time": ("Ti", "sqrt(Ti Td)"), "integral-limit": ("output",)}
+"""Words that stand where a setting's name could."""
+_REFERENCES: Final = (
+    (("proportional", "weight"), "proportional-weight"),
+    (("cascade", "proportional", "weight"), "proportional-weight"),
+    (("derivative", "weight"), "derivative-weight"),
+    (("derivative", "filter", "ratio"), "filter-ratio"),
+    (("derivative", "filter", "gain"), "filter-gain"),
+    (("derivative", "filter", "time"), "filter-time"),
+    (("integral", "windup", "tracking_time"), "tracking-time"),
+    (("integral", "limits", "low"), "integral-limit"),
+    (("integral", "limits", "high"), "integral-limit"),
+    (("integral", "deadband"), "deadband"),
+    (("setpoint", "filter", "time"), "filter-time"),
+    (("setpoint", "filter", "factor"), "filter-factor"),
+    (("setpoint", "rate"), "setpoint-rate"),
+    (("measurement", "filter", "time"), "filter-time"),
+    (("measurement", "filter", "factor"), "filter-factor"),
+    (("error", "filter", "time"), "filter-time"),
+    (("error", "filter", "factor"), "filter-factor"),
+    (("error", "band"), "deadband"),
+    (("error", "gain"), "gap-gain"),
+    (("error", "linearity"), "linearity"),
+    (("feedforward", "gain"), "feedforward-gain"),
+    (("output", "rate"), "output-rate"),
+    (("output", "deadband"), "deadband"),
+    (("output", "resolution"), "resolution"),
+)
+"""Fields that may name a setting, and what that setting must set."""
 
 
 def reject_bad_units(variant: Variant) -> Iterator[Problem]:
@@ -82,10 +116,16 @@ def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
 def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
     """Each term has exactly one dial."""
     equation, document = variant.equation, variant.card.document
+    dahlin = equation.form == "dahlin"
     roles = {
-        "gain": not (equation.form == "parallel" and equation.proportional.on == "none"),
-        "integral": equation.integral.on != "none",
+        "gain": not dahlin and not (equation.form == "parallel" and equation.proportional.on == "none"),
+        "integral": not dahlin and equation.integral.on != "none",
         "derivative": equation.derivative.on != "none",
+        "process-gain": dahlin,
+        "process-time": dahlin,
+        "process-delay": dahlin,
+        "closed-loop-time": dahlin,
+        "bias": False,
     }
     for role, needed in roles.items():
         dials = [n for n, s in equation.settings.items() if s.sets == role]
@@ -101,9 +141,10 @@ def reject_bad_references(variant: Variant) -> Iterator[Problem]:
     """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
     equation, document = variant.equation, variant.card.document
     for path, name, role in _references(equation):
-        if isinstance(name, float) and not 0 <= name < math.inf:
-            yield document.problem(variant.home(path), f"{path[-1]} is {name:g}; it is a number from 0 up")
-        if not isinstance(name, str) or (role == "tracking-time" and name in ("Ti", "sqrt(Ti Td)")):
+        signed = role == "integral-limit"
+        if isinstance(name, float) and (math.isnan(name) if signed else not 0 <= name < math.inf):
+            yield document.problem(variant.home(path), f"{path[-1]} is {name:g}; it is a number{'' if signed else ' from 0 up'}")
+        if not isinstance(name, str) or name in _WORDS.get(role, ()):
             continue
         setting = equation.settings.get(name)
         if setting is None:
@@ -113,19 +154,114 @@ def reject_bad_references(variant: Variant) -> Iterator[Problem]:
     named = {name for _, name, _ in _references(equation)}
     everywhere = {n for v in variants(variant.card) for _, n, _ in _references(v.equation)}
     for name, setting in equation.settings.items():
-        needs = setting.sets not in ("gain", "multiplier", "integral", "derivative")
+        needs = setting.sets not in _BY_ROLE
         if needs and name not in named and name not in everywhere:
             yield document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
 
 
 def _references(equation: Equation) -> Iterator[tuple[Path_, object, str]]:
-    yield ("proportional", "weight"), equation.proportional.weight, "proportional-weight"
-    yield ("derivative", "weight"), equation.derivative.weight, "derivative-weight"
-    if equation.derivative.filter is not None:
-        for key in ("ratio", "gain", "time"):
-            yield ("derivative", "filter", key), getattr(equation.derivative.filter, key), f"filter-{key}"
-    tracking = getattr(equation.integral.windup, "tracking_time", None)
-    yield ("integral", "windup", "tracking-time"), tracking, "tracking-time"
+    """Yield every field that may name a setting: its path, its value and the role that the setting must have."""
+    for path, role in _REFERENCES:
+        part: object = equation
+        for key in path:
+            part = getattr(part, key, None)
+        if part is not None:
+            yield tuple(key.replace("_", "-") for key in path), part, role
+
+
+def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
+    """A filter on a signal has a time or a factor, and a factor is a share of the new sample."""
+    for key in ("setpoint", "measurement", "error"):
+        part = getattr(variant.equation, key)
+        if part is None or part.filter is None:
+            continue
+        home = variant.home((key, "filter"))
+        if (part.filter.time is None) == (part.filter.factor is None):
+            yield variant.card.document.problem(home, "a filter on a signal needs exactly one of time and factor", at_key=True)
+        if isinstance(part.filter.factor, float) and not 0 < part.filter.factor <= 1:
+            yield variant.card.document.problem((*home, "factor"), f"factor is {part.filter.factor:g}; it is above 0, up to 1")
+
+
+def reject_bad_error(variant: Variant) -> Iterator[Problem]:
+    """A shape of the error has what it needs and nothing else, and a filtered error is what P and D act on."""
+    equation, document = variant.equation, variant.card.document
+    error = equation.error
+    if error is None:
+        return
+    home = variant.home(("error",))
+    for key, shape in (("band", "gap"), ("linearity", "gain-linear")):
+        given = getattr(error, key) is not None
+        if given != (error.shape == shape):
+            message = f"shape '{shape}' needs '{key}'" if not given else f"'{key}' has no meaning with shape '{error.shape}'"
+            yield document.problem(home, message, at_key=True)
+    if error.shape != "gap" and (error.gain != 0 or error.subtracted or error.zero_crossing):
+        yield document.problem(home, "'gain', 'subtracted' and 'zero-crossing' belong to shape 'gap'", at_key=True)
+    if error.filter is not None and not {equation.proportional.on, equation.derivative.on} <= {"error", "none"}:
+        yield document.problem(home, "a filter on the error needs P and D on the error", at_key=True)
+
+
+def reject_bad_cascade(variant: Variant) -> Iterator[Problem]:
+    """In cascade the proportional term may have another setpoint weight, and nothing else."""
+    equation, cascade = variant.equation, variant.equation.cascade
+    if cascade is not None and (cascade.proportional.on == "none" or equation.proportional.on == "none"):
+        message = "a proportional term that comes or goes with the mode is not defined"
+        yield variant.card.document.problem(variant.home(("cascade",)), message, at_key=True)
+
+
+def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
+    """The fine print of a transfer goes with the transfer that it belongs to."""
+    equation, document = variant.equation, variant.card.document
+    t, home = equation.transfer, variant.home(("transfer",))
+    if equation.implementation == "velocity" and (t.start != "bumpless" or t.power_up != "transfer"):
+        yield document.problem(home, "a velocity implementation starts from the last output: 'bumpless'", at_key=True)
+    if t.first_scan == "holds" and t.start in ("bumpless", "tracked"):
+        yield document.problem(home, f"'first-scan' has no meaning with start '{t.start}'", at_key=True)
+    if t.start != "load-output" and (t.loaded != "limited" or t.without_integral != "kept"):
+        yield document.problem(home, "'loaded' and 'without-integral' belong to start 'load-output'", at_key=True)
+    if t.changes == "bumpless" and equation.integral.holds != "ki e":
+        yield document.problem(home, "'changes: bumpless' needs an integral that holds 'ki e'", at_key=True)
+
+
+def reject_bad_arithmetic(variant: Variant) -> Iterator[Problem]:
+    """Whole numbers have a size, and an algorithm that is written for them."""
+    equation, document, a = variant.equation, variant.card.document, variant.equation.arithmetic
+    if a is None:
+        return
+    home = variant.home(("arithmetic",))
+    if (a.type == "integer") != (a.counts is not None and a.gain_counts is not None):
+        yield document.problem(home, "'counts' and 'gain-counts' go with type 'integer'", at_key=True)
+    if a.type != "float32" and a.literals != "float32":
+        yield document.problem(home, "'literals' belongs to type 'float32'", at_key=True)
+    fits = equation.form == "standard" and equation.implementation == "velocity" and equation.integral.rule == "backward"
+    fits = fits and equation.proportional.on == "error" and equation.derivative.on in ("pv", "none")
+    if a.type == "integer" and not fits:
+        message = "type 'integer' is defined for velocity, standard form, backward rule, P on error, D on pv"
+        yield document.problem(home, message, at_key=True)
+
+
+def reject_bad_pole_cancellation(variant: Variant) -> Iterator[Problem]:
+    """Pole cancellation is a recursion on past outputs and has no terms of its own."""
+    equation = variant.equation
+    if equation.form != "dahlin":
+        return
+    if equation.implementation != "velocity" or (equation.proportional.on, equation.derivative.on) != ("none", "none"):
+        message = "form 'dahlin' is a velocity implementation without P and D: 'on: none'"
+        yield variant.card.document.problem(variant.home(("form",)), message)
+
+
+def reject_bad_derivative_rule(variant: Variant) -> Iterator[Problem]:
+    """Two rules of the derivative have a say in its filter."""
+    rule, filt = variant.equation.derivative.rule, variant.equation.derivative.filter
+    on_term = filt is not None and filt.applies_to in ("term", "lead-lag")
+    if variant.equation.derivative.on == "none":
+        return
+    home = variant.home(("derivative", "rule"))
+    if rule == "lagged-difference" and not on_term:
+        yield variant.card.document.problem(home, "the lagged-difference rule needs a filter on the term")
+    if rule == "four-point" and on_term:
+        yield variant.card.document.problem(home, "the four-point rule goes with no other filter on the term")
+    if filt is not None and not on_term and filt.rule is None and rule not in GENERAL_RULES:
+        yield variant.card.document.problem(home, f"the filter needs a rule of its own: '{rule}' is one of the derivative only")
 
 
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
@@ -177,6 +313,28 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, "clamp-sum with P on pv needs 'proportional.accumulated: true'", at_key=True)
 
 
+def reject_bad_windup_details(variant: Variant) -> Iterator[Problem]:
+    """The fine print of a windup scheme goes with the scheme that it belongs to."""
+    windup, document, home = variant.equation.integral.windup, variant.card.document, variant.home(("integral", "windup"))
+    if isinstance(windup, WindupGate):
+        freezes = windup.scheme == "freeze"
+        if not freezes and (windup.judged_on != "output" or windup.direction != "further"):
+            yield document.problem(home, "'judged-on' and 'direction' belong to 'freeze'", at_key=True)
+        if freezes and windup.test != "increment":
+            yield document.problem(home, "'test' belongs to 'conditional'", at_key=True)
+    if isinstance(windup, WindupBackCalculation):
+        word = windup.tracking_time in ("Ti", "sqrt(Ti Td)")
+        if word and (windup.times is not None or windup.when_off is not None):
+            yield document.problem(home, "'times' and 'when-off' go with a number or a setting under 'tracking-time'", at_key=True)
+    if variant.equation.integral.holds != "ki e" and (
+        variant.equation.implementation == "velocity"
+        or variant.equation.form == "parallel"
+        or windup.scheme in ("clamp", "clamp-sum")
+    ):
+        message = "an integral that does not hold 'ki e' needs a positional implementation with one gain, and limits of its own"
+        yield document.problem(variant.home(("integral", "holds")), message)
+
+
 def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
     """The one-scan example of the action is true when it is run."""
     example, names = variant.equation.action.example, variant.equation.action.names
@@ -209,5 +367,13 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_weights,
     reject_bad_filter,
     reject_bad_windup,
+    reject_bad_windup_details,
+    reject_bad_signal_filters,
+    reject_bad_error,
+    reject_bad_cascade,
+    reject_bad_transfer,
+    reject_bad_arithmetic,
+    reject_bad_pole_cancellation,
+    reject_bad_derivative_rule,
     reject_wrong_action,
 )

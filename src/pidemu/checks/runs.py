@@ -7,41 +7,55 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.load import Card, Variant, variants
+from pidemu.card.models import Canonical
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
 from pidemu.settings import Settings, is_active, limits, off_values
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
 """Examples are printed with six digits."""
+_AT_REST: Final = 300
+"""Scans at rest before the step of an example."""
 
 
 def reject_wrong_examples(card: Card) -> Iterator[Problem]:
     """Every example is run."""
     for i, example in enumerate(card.data.examples):
+        place = ("examples", i)
+        if example.canonical is None and example.outputs is None:
+            yield card.document.problem(place, "an example needs 'canonical' or 'outputs', or both")
         try:
-            law = card.settings(example.given).law()
-            n0, n1, n2, d1, d2 = law.coefficients()
+            settings = card.settings(example.given)
+            if example.canonical is not None:
+                yield from _wrong_gains(card, i, settings, example.canonical)
+            if example.outputs is not None:
+                yield from _wrong_outputs(card, i, settings, example.outputs)
         except PidemuError as error:
             for line in str(error).splitlines():
-                yield card.document.problem(("examples", i, "given"), line, at_key=True)
-            continue
-        if abs(d2) > 1e-12:
-            yield card.document.problem(("examples", i), "a second-order filter has no parallel gains; choose settings without it")
-            continue
-        kp = n1 - n0 * d1
-        found = {"kp": kp, "ki": n0, "kd": n2 - kp * d1, "Tf": d1}
-        stated = {
-            "kp": example.canonical.kp,
-            "ki": example.canonical.ki,
-            "kd": example.canonical.kd,
-            "Tf": example.canonical.Tf,
-        }
-        for name, value in found.items():
-            if not math.isclose(stated[name], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-9):
-                yield card.document.problem(
-                    ("examples", i, "canonical", name),
-                    f"{name} is {stated[name]:g}, the settings amount to {value:.6g}",
-                )
+                yield card.document.problem((*place, "given"), line, at_key=True)
+
+
+def _wrong_gains(card: Card, i: int, settings: Settings, stated: Canonical) -> Iterator[Problem]:
+    n0, n1, n2, d1, d2 = settings.law().coefficients()
+    if abs(d2) > 1e-12:
+        yield card.document.problem(("examples", i), "a second-order filter has no parallel gains; choose settings without it")
+        return
+    kp = n1 - n0 * d1
+    for name, value in {"kp": kp, "ki": n0, "kd": n2 - kp * d1, "Tf": d1}.items():
+        if not math.isclose(getattr(stated, name), value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-9):
+            yield card.document.problem(
+                ("examples", i, "canonical", name),
+                f"{name} is {getattr(stated, name):g}, the settings amount to {value:.6g}",
+            )
+
+
+def _wrong_outputs(card: Card, i: int, settings: Settings, stated: list[float]) -> Iterator[Problem]:
+    limits = (-1e6, 1e6) if settings.algorithm().precision != "integer" else (0.0, 1e4)
+    controller = Controller(settings, output_limits=limits, initial_output=50.0)
+    rest = controller.run(50.0, [50.0] * _AT_REST)[-1]
+    for n, value in enumerate(controller.run(51.0, [50.0] * len(stated)) - rest):
+        if not math.isclose(stated[n], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-6):
+            yield card.document.problem(("examples", i, "outputs", n), f"output {n} is {stated[n]:g}, the card's is {value:.6g}")
 
 
 def reject_unrunnable(card: Card) -> Iterator[Problem]:

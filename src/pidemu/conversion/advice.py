@@ -34,6 +34,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     yield from _noise(c)
     yield from _without_integral(c.source, c.settings)
     yield from _nonlinear(c.source, c.settings)
+    yield from _beyond_the_law(c.source, c.settings)
     yield from _action(c.source, c.settings)
     yield from _scan(c)
 
@@ -136,6 +137,15 @@ def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
     if old.output.limits != new.output.limits and old.signals == new.signals:
         low, high = ("{:g} to {:g}".format(*e.output.limits) for e in (old, new))
         yield f"default output limits differ: {low} on the source, {high} on the target"
+
+
+def _beyond_the_law(source: Settings, target: Settings) -> Iterator[str]:
+    """Name what neither the law nor the certificate sees."""
+    old, new = source.algorithm().beyond_the_law, target.algorithm().beyond_the_law
+    for who, mine, other in ((source, old, new), (target, new, old)):
+        extra = [what for what in mine if what not in other]
+        if extra:
+            yield f"only {who.card.id} has, beyond the linear law: {', '.join(extra)}"
 
 
 def _action(source: Settings, target: Settings) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
+from pidemu.card.models import Form
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.alternatives import better_options
 from pidemu.conversion.certificate import Certificate, Rounded, Verdict
@@ -199,6 +200,7 @@ def convert(
     if match is not None and match not in MATCHES:
         raise SettingError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
     card = target if isinstance(target, Card) else load_card(target)
+    _refuse_recursions(source, card)
     factor = _rescaling(source, pv_range, op_range)
     scans = _scans(scan)
     same = source.card.id == card.id
@@ -228,6 +230,14 @@ def convert(
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)
     return conversion
+
+
+def _refuse_recursions(source: Settings, target: Card) -> None:
+    for card in (source.card, target):
+        if card.data.form is Form.DAHLIN:
+            raise ConversionRefusedError(
+                f"{card.id} cancels the pole of a process model and has no PID settings; tune the other card for that process instead"
+            )
 
 
 def _scans(scan: float | tuple[float, float] | None) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from pidemu.algorithm import Algorithm
+from pidemu.canonical import gain_sign
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Form, Setting
 from pidemu.errors import SettingError
@@ -227,7 +228,11 @@ class Target:
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
-        wanted = [(Role.GAIN, n.K / scale), (Role.INTEGRAL, rate), (Role.DERIVATIVE, time), (Role.MULTIPLIER, scale)]
+        sign = gain_sign(self.variant.equation)  # a parallel form carries it on every gain, the others on one
+        each = sign if parallel else 1.0
+        wanted = [
+            (Role.GAIN, sign * n.K / scale), (Role.INTEGRAL, each * rate), (Role.DERIVATIVE, each * time), (Role.MULTIPLIER, scale),
+        ]  # fmt: skip
         if n.b is not None:
             wanted.append((Role.PROPORTIONAL_WEIGHT, n.b))
         if n.c is not None:

@@ -152,7 +152,10 @@ def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
     band = b.coefficient("band", s.band, "half width of the band", "%")
     inside = size <= band
     if s.zero_crossing:
-        crossed, e1 = b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"), b.state(f"{what}_was", "last error")
+        crossed, e1 = (
+            b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"),
+            b.state(f"{what}_was", "last error"),
+        )
         before = select(afresh, e, e1)
         seen = (crossed > 0.0) | (e * before <= 0.0)
         b.let(crossed.id, select(inside & seen, 1.0, 0.0), "zero crossing (section 8)")
@@ -250,7 +253,10 @@ def derivative(b: Builder, x: Expr, afresh: Expr, a: Algorithm, gain: float, Tf:
         Filter time and scan interval [s].
     """
     history = 3 if a.derivative_rule is Rule.FOUR_POINT else 1
-    past = [b.state(f"x{n}", f"signal of the derivative {'at the last scan' if n == 1 else f'{n} scans ago'}") for n in range(1, history + 1)]
+    past = [
+        b.state(f"x{n}", f"signal of the derivative {'at the last scan' if n == 1 else f'{n} scans ago'}")
+        for n in range(1, history + 1)
+    ]
     for state in past:
         b.let(state.id, _before(b, a, x, state, afresh), "no derivative of the step from nothing to the first sample")
     state = b.state("D", "derivative term")

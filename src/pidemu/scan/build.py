@@ -93,9 +93,7 @@ def _representable(limits: tuple[float, float], a: Algorithm) -> tuple[float, fl
     return float(low), float(high)
 
 
-def _check(
-    a: Algorithm, h: float, limits: tuple[float, float], bias: float, initial_output: float, signals: Sequence[str]
-) -> None:
+def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, initial_output: float, signals: Sequence[str]) -> None:
     if not (math.isfinite(h) and (h > 0 or (h == 0 and a.derivative_rule is Rule.LAGGED_DIFFERENCE))):
         raise ScanError(f"scan interval {h:g} s is not a positive number")
     for name, value in (("bias", bias), ("initial output", initial_output)):

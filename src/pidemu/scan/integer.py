@@ -49,7 +49,9 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     if a.ki:
         parts.append(_integral(b, e, _ticks(h, "scan interval"), _ticks(a.kp / a.ki, "integral time")))
     if a.kd:
-        parts.append(_derivative(b, y, _ticks(h, "scan interval"), _ticks(a.kd / a.kp, "derivative time"), _ticks(a.Tf, "filter time"), t))
+        parts.append(
+            _derivative(b, y, _ticks(h, "scan interval"), _ticks(a.kd / a.kp, "derivative time"), _ticks(a.Tf, "filter time"), t)
+        )
     total = b.state("M", "output sum, in parts of a count", "-")
     resting = Floor(t.u * counts * fine + 0.5)
     b.let("M", select(t.on, total, resting), "at a transfer the sum is the last output (section 6)")
@@ -95,15 +97,25 @@ def _divided(b: Builder, name: str, total: Expr, by: Name, remainder: Name, text
 
 
 def _integral(b: Builder, e: Expr, h: int, Ti: int) -> Expr:
-    step, time = b.coefficient("h_ticks", float(h), "scan interval", "ticks"), b.coefficient("Ti_ticks", float(Ti), "integral time", "ticks")
+    step, time = (
+        b.coefficient("h_ticks", float(h), "scan interval", "ticks"),
+        b.coefficient("Ti_ticks", float(Ti), "integral time", "ticks"),
+    )
     rest = b.state("Ir", "remainder of the integral", "-")
     return _divided(b, "dI", e * step + rest, time, rest, "increment of the integral")
 
 
 def _derivative(b: Builder, y: Expr, h: int, Td: int, Tf: int, t: Terms) -> Expr:
-    step, time = b.coefficient("h_ticks", float(h), "scan interval", "ticks"), b.coefficient("Td_ticks", float(Td), "derivative time", "ticks")
+    step, time = (
+        b.coefficient("h_ticks", float(h), "scan interval", "ticks"),
+        b.coefficient("Td_ticks", float(Td), "derivative time", "ticks"),
+    )
     under = b.coefficient("under", float(h + Tf), "scan interval and filter time", "ticks")
-    y1, D, rest = b.state("y1", "measurement in counts at the last scan", "-"), b.state("D", "derivative term in counts", "-"), b.state("Dr", "remainder of the derivative", "-")
+    y1, D, rest = (
+        b.state("y1", "measurement in counts at the last scan", "-"),
+        b.state("D", "derivative term in counts", "-"),
+        b.state("Dr", "remainder of the derivative", "-"),
+    )
     b.let("y1", select(t.fresh, y, y1), "no derivative of the step from nothing to the first sample")
     moved = _divided(b, "dD", time * (y1 - y) - step * D + rest, under, rest, "increment of the derivative")
     b.let("D", D + moved, "derivative term")

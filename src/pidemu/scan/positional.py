@@ -123,9 +123,7 @@ def _growth(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     return grown
 
 
-def _gated(
-    b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr | None, last: Name
-) -> Expr | None:
+def _gated(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr | None, last: Name) -> Expr | None:
     """Stop or hasten the integral at a limit where the windup scheme says so (section 5)."""
     if grown is None or (a.windup not in ("freeze", "conditional") and a.gate.fast_return == 1):
         return grown

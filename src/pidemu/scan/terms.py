@@ -122,7 +122,11 @@ def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, y: Expr, cascade:
         local, given = b.state("sp_own", "setpoint in force"), b.state("sp1", "setpoint given at the last scan")
         stays = equal(r, given)
         start = select(b.fresh, r, select(stays, local, r))
-        b.let(local.id, select(b.automatic, start, Name("pv")), "setpoint: follows the measurement in manual, stays until it is changed (section 6)")
+        b.let(
+            local.id,
+            select(b.automatic, start, Name("pv")),
+            "setpoint: follows the measurement in manual, stays until it is changed (section 6)",
+        )
         b.let(given.id, r, "kept for the next scan")
         r = local
     if cascade is not None:

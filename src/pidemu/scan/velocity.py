@@ -60,7 +60,9 @@ def _of_the_mode(b: Builder, a: Algorithm, t: Terms, in_cascade: float) -> Expr:
         other = b.coefficient("b_cascade", in_cascade, "setpoint weight in cascade", "-")
         weight = b.let("b_now", select(s.cascade, other, weight), "setpoint weight in this mode")
     kp = b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%")
-    moved = b.let("dP", kp * (weight * (s.r - r1) - (s.y - y1)), "increment of the proportional term, structure of the mode (section 6)")
+    moved = b.let(
+        "dP", kp * (weight * (s.r - r1) - (s.y - y1)), "increment of the proportional term, structure of the mode (section 6)"
+    )
     b.let("r_last", s.r, "kept for the next scan")
     b.let("y_last", s.y, "kept for the next scan")
     return moved
