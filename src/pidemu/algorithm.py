@@ -52,8 +52,8 @@ class Shape:
         Half width of the gap [%].
     gain : float
         Gain within the gap; 0: a deadband.
-    subtracted, zero_crossing : bool
-        Whether the error is continuous at the edge; whether the gap waits for a change of sign.
+    subtracted, zero_crossing, open_edge : bool
+        Whether the error is continuous at the edge; whether the gap waits for a change of sign; whether the edge itself is outside.
     linearity : float
         ``L`` of gain-linear.
     over : float
@@ -67,6 +67,7 @@ class Shape:
     gain: float = 0.0
     subtracted: bool = False
     zero_crossing: bool = False
+    open_edge: bool = False
     linearity: float = 1.0
     over: float = 100.0
     on: Literal["error", "proportional", "integral"] = "error"
@@ -80,8 +81,14 @@ class Gate:
     ----------
     without_derivative : bool
         The limits are held against ``P + I``.
+    this_scan : bool
+        `freeze` looks at this scan's sum, with the increment.
     both : bool
         `freeze` stops the integral whichever way it would move.
+    unless_smaller : bool
+        `freeze` stops the integral unless its size becomes smaller.
+    from_integrated : bool
+        After a freeze the trapezoidal rule goes on from the last error that was integrated.
     by_output_sign : bool
         `conditional` judges by the sign of error times output.
     fast_return : float
@@ -91,7 +98,10 @@ class Gate:
     """
 
     without_derivative: bool = False
+    this_scan: bool = False
     both: bool = False
+    unless_smaller: bool = False
+    from_integrated: bool = False
     by_output_sign: bool = False
     fast_return: float = 1.0
     clamped: bool = False
@@ -159,6 +169,12 @@ class Algorithm:
         Its fine print.
     tracking_time : float
         Tracking time of back-calculation [s].
+    implicit_tracking : bool
+        Its share per scan is ``h/(Tt + h)``.
+    limits_without_integral : bool
+        With `clamp` and no integral action, the sum is what the limits make of zero.
+    reads_back : bool
+        A velocity implementation starts from the output read back, where there is one.
     accumulated : bool
         P on PV is accumulated from its value at the start.
     start : str
@@ -173,8 +189,10 @@ class Algorithm:
         The integral begins at zero at the very first scan.
     derivative_start : {"running", "restarted", "zeroed", "preset"}
         What filters and differences do at the transfer.
-    derivative_from_zero : bool
-        At the very first scan the previous signal of the derivative is zero.
+    derivative_from_zero, integral_from_zero : bool
+        At the very first scan the previous signal of the derivative, of the trapezoidal integral, is zero.
+    zero_first_output : bool
+        The output of the very first scan is zero.
     manual_output : {"operator", "gain-times-operator", "zero"}
         The output in manual.
     gain_sign : float
@@ -233,6 +251,9 @@ class Algorithm:
     windup: Scheme = "none"
     gate: Gate = Gate()
     tracking_time: float = 0.0
+    implicit_tracking: bool = False
+    limits_without_integral: bool = False
+    reads_back: bool = False
     accumulated: bool = False
     start: Start = "bumpless"
     keeps_load: bool = True
@@ -241,6 +262,8 @@ class Algorithm:
     zero_power_up: bool = False
     derivative_start: Literal["running", "restarted", "zeroed", "preset"] = "running"
     derivative_from_zero: bool = False
+    integral_from_zero: bool = False
+    zero_first_output: bool = False
     manual_output: Literal["operator", "gain-times-operator", "zero"] = "operator"
     gain_sign: float = 1.0
     bumpless_changes: bool = False

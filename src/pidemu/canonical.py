@@ -97,9 +97,12 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
         windup=equation.integral.windup.scheme,
         gate=_gate(equation),
         tracking_time=_tracking(read, rate, time, kp, ki, kd) if ki else 0.0,
+        implicit_tracking=getattr(equation.integral.windup, "implicit", False),
+        limits_without_integral=getattr(equation.integral.windup, "without_integral", "zero") == "limited",
+        reads_back=getattr(equation.integral.windup, "reads_back", False),
         accumulated=equation.proportional.accumulated,
         gain_sign=gain_sign(equation),
-        holds=equation.integral.holds,
+        holds=equation.integral.holds if kp else "ki e",
         integral_limits=_integral_limits(read, equation.integral.limits),
         integral_deadband=_some(read.pick(equation.integral.deadband, 0.0)) if equation.integral.deadband is not None else None,
         bias=read.role(Role.BIAS, 0.0),
@@ -117,8 +120,6 @@ def _refuse_undefined(settings: Settings, kp: float, kd: float) -> None:
             f"{settings.card.id}: a series form with derivative but without proportional action is not defined; "
             f"change {settings.variant.choice_text}"
         )
-    if equation.integral.holds != "ki e" and equation.integral.on != "none" and not kp:
-        raise UndefinedError(f"{settings.card.id}: the gain multiplies all terms and is zero; give it another value")
 
 
 def _some(value: float) -> float | None:
@@ -157,7 +158,10 @@ def _gate(equation: Equation) -> Gate:
         case WindupGate() as w:
             return Gate(
                 without_derivative=w.judged_on == "sum-without-derivative",
+                this_scan=w.judged_on == "sum",
                 both=w.direction == "both",
+                unless_smaller=w.direction == "unless-smaller",
+                from_integrated=w.resumes_from == "last-integrated",
                 by_output_sign=w.test == "error-times-output",
                 fast_return=w.fast_return,
             )
@@ -210,6 +214,8 @@ def _transfer(equation: Equation) -> dict[str, Any]:
         "zero_power_up": t.power_up == "zero",
         "derivative_start": t.derivative,
         "derivative_from_zero": equation.derivative.starts == "zero",
+        "integral_from_zero": equation.integral.starts == "zero",
+        "zero_first_output": t.first_output == "zero",
         "manual_output": t.manual_output,
         "bumpless_changes": t.changes == "bumpless",
     }
@@ -236,7 +242,17 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
         return None
     gain = read.value(error.gain) if isinstance(error.gain, str) else error.gain
     on = "integral" if error.on == "error" and equation.proportional.on == "pv" else error.on
-    return Shape(error.shape, band, gain, error.subtracted, error.zero_crossing, linearity, error.over, on)
+    return Shape(
+        kind=error.shape,
+        band=band,
+        gain=gain,
+        subtracted=error.subtracted,
+        zero_crossing=error.zero_crossing,
+        open_edge=error.edge == "outside",
+        linearity=linearity,
+        over=error.over,
+        on=on,
+    )
 
 
 def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:

@@ -227,8 +227,8 @@ class Controller:
                 raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
             if not math.isfinite(value):
                 raise ScanError(f"the state {name} = {value} is not a finite number")
-        running = {name: 1.0 for name in ("on", "begun") if "I" in states and name in names}
-        for name, value in {**running, **states}.items():
+        running = [name for name in ("on", "begun") if "I" in states and name in names]
+        for name, value in (dict.fromkeys(running, 1.0) | states).items():
             kind = type(self._compiled.initial[names.index(name)])  # float, or what the program rounds to
             self._state[names.index(name)] = kind(value)
 
@@ -369,7 +369,7 @@ class Controller:
             self._transfer(self._count, mode, float(u) - was)
         self._last = inputs
         self._count += 1
-        return u
+        return float(u)
 
     def _transfer(self, scan: int, mode: Mode, bump: float) -> None:
         self.events.append(Event(scan, "transfer", f"{self._mode} to {mode}", bump))
@@ -384,7 +384,7 @@ class Controller:
     def _read(self, extra: Mapping[str, object]) -> None:
         """Make the program read signals that it did not read so far."""
         a = self.settings.algorithm()
-        if "external_reset" in extra and a.windup != "external-reset":
+        if "external_reset" in extra and a.windup != "external-reset" and not a.reads_back:
             raise ScanError(
                 f"{self.settings.card.id} takes no external reset: its windup scheme is '{a.windup}'; leave the signal out"
             )
@@ -443,6 +443,8 @@ class Controller:
             follow = inputs[4 + self._names.index("track")] if "track" in self._signals else math.nan
             by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else math.nan
             u = was if math.isnan(by_hand) else by_hand
+            if mode == "manual":
+                u = self._by_hand(u, moved=not math.isnan(by_hand))
             self._state[at] = u
             if "on" in names:
                 self._state[names.index("on")] = 0.0
@@ -450,6 +452,13 @@ class Controller:
             self._transfer(self._count, mode, u - was)
         self._count += 1
         return u if instead is None else instead
+
+    def _by_hand(self, u: float, *, moved: bool) -> float:
+        """Return the output in manual, as the card has it (`transfer.manual-output`)."""
+        a = self.settings.algorithm(own_units=True)
+        if a.manual_output == "zero":
+            return 0.0
+        return a.gain_sign * a.kp * u if a.manual_output == "gain-times-operator" and moved else u
 
     def run(
         self,

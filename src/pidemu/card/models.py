@@ -192,6 +192,9 @@ class ErrorShape(Model):
     zero_crossing: Flag = Field(
         default=False, description="With `gap`: the band counts only after the error has changed its sign within it."
     )
+    edge: Literal["inside", "outside"] = Field(
+        default="inside", description="With `gap`: whether an error of exactly the band is inside it."
+    )
     linearity: Reference | None = Field(default=None, description="L, with `gain-linear`: a number, or the name of a setting.")
     over: Annotated[float, Field(gt=0, strict=True)] = Field(
         default=100.0, description="The |e| at which `squared` and `gain-linear` have gain 1 [as the measurement]."
@@ -215,6 +218,10 @@ class WindupClamp(Model):
         "an accumulator "
         "that also holds P on PV."
     )
+    without_integral: Literal["zero", "limited"] = Field(
+        default="zero",
+        description="With the integral switched off and nothing loaded: the sum is zero, or what the limits make of zero.",
+    )
 
 
 class WindupGate(Model):
@@ -224,12 +231,20 @@ class WindupGate(Model):
         description="`freeze`: no integration that pushes further while the last output is at a limit. `conditional`: no "
         "integration while the output is beyond a limit and the increment would push it further."
     )
-    judged_on: Literal["output", "sum-without-derivative"] = Field(
+    judged_on: Literal["output", "sum-without-derivative", "sum"] = Field(
         default="output",
-        description="What `freeze` looks at, from the last scan: the output, or P + I before the derivative is added.",
+        description="What `freeze` looks at: the last output; P + I of the last scan, before the derivative was added; or this scan's sum "
+        "with the increment, which then counts for the output but is not kept.",
     )
-    direction: Literal["further", "both"] = Field(
-        default="further", description="With `freeze`: `both` stops the integral at a limit whichever way it would move."
+    direction: Literal["further", "both", "unless-smaller"] = Field(
+        default="further",
+        description="With `freeze`: stop only what pushes further; stop the integral whichever way it would move; or stop it unless its size "
+        "becomes smaller.",
+    )
+    resumes_from: Literal["last", "last-integrated"] = Field(
+        default="last",
+        description="With `freeze` and the trapezoidal rule: after a freeze the increment starts from the last error, or from the last one that "
+        "was integrated.",
     )
     test: Literal["increment", "error-times-output"] = Field(
         default="increment",
@@ -246,7 +261,8 @@ class WindupRecompute(Model):
 
     scheme: Literal["recompute"] = Field(description="Where the sum reaches a limit: `I = limit - P - D`, after the output.")
     without_derivative: Flag = Field(
-        default=False, description="Whether the derivative is left out: `P + I` is held against the limits and `I = limit - P`."
+        default=False,
+        description="Whether the derivative comes last: `P + I` is limited, with `I = limit - P`, then D is added and the sum limited again.",
     )
     clamped: Flag = Field(default=False, description="Whether the integral is limited to the output limits as well.")
 
@@ -272,6 +288,9 @@ class WindupBackCalculation(Model):
     when_off: Literal["Ti", "sqrt(Ti Td)"] | None = Field(
         default=None, description="The tracking time taken where the setting under `tracking-time` has its off value."
     )
+    implicit: Flag = Field(
+        default=False, description="Whether the share per scan is `h/(Tt + h)`, as an implicit solver has it, instead of `h/Tt`."
+    )
 
 
 class WindupExternalReset(Model):
@@ -294,6 +313,10 @@ class WindupVelocity(Model):
     scheme: Literal["velocity"] = Field(
         description="The increment is added to the last limited output; nothing else is done. Required, and only allowed, with "
         "`implementation: velocity`."
+    )
+    reads_back: Flag = Field(
+        default=False,
+        description="Whether the increment is added to the external reset signal, the output read back from downstream, where there is one.",
     )
 
 
@@ -336,9 +359,13 @@ class Integral(Model):
     limits: IntegralLimits | None = Field(
         default=None, description="Limits of the state, in the units of what it holds, besides what `windup` does."
     )
+    starts: Literal["sample", "zero"] = Field(
+        default="sample",
+        description="With the trapezoidal rule: at power-up the previous error is the first one, or zero, so that half of the first counts.",
+    )
     deadband: Reference | None = Field(
         default=None,
-        description="No integration while |e| is at most this [as the measurement]: a number, or the name of a setting.",
+        description="The integral stands still while |e| is at most this [as the measurement]: a number, or the name of a setting.",
     )
     windup: Windup = Field(description="What happens to the integral at an output limit (specs/equations.md, section 5).")
 
@@ -443,6 +470,10 @@ class Transfer(Model):
         default="transfer",
         description="The very first scan, in automatic: a `transfer` from the initial output, or the integral begins at `zero`, "
         "whatever the output was.",
+    )
+    first_output: Literal["computed", "zero"] = Field(
+        default="computed",
+        description="The output of the very first scan: computed, or zero because that scan only prepares the block.",
     )
     manual_output: Literal["operator", "gain-times-operator", "zero"] = Field(
         default="operator",

@@ -150,7 +150,7 @@ def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
         rest = b.coefficient("rest", 1 - s.linearity, "share of the gain that grows with the error", "-")
         return b.let(f"{what}_s", e * (linear + rest * (size / over)), "gain linear in |e| (section 8)")
     band = b.coefficient("band", s.band, "half width of the band", "%")
-    inside = size <= band
+    inside = size < band if s.open_edge else size <= band
     if s.zero_crossing:
         crossed, e1 = (
             b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"),
@@ -323,7 +323,7 @@ def _lagged_difference(b: Builder, x: Expr, xf: Name, gain: float, Tf: float, h:
     b.let("D", k * (x - xf), f"derivative, Tf = {Tf:.6g} s, lagged difference (section 4)")
 
 
-def increment(b: Builder, w: Expr, afresh: Expr, rate: float, h: float, rule: Rule) -> Expr:
+def increment(b: Builder, w: Expr, afresh: Expr, rate: float, h: float, rule: Rule, *, from_zero: bool = False) -> Expr:
     """Return what the integral of `w` grows by in this scan (section 4).
 
     With the forward rule this is the growth *after* the output of this scan, so a positional program adds it there.
@@ -342,12 +342,16 @@ def increment(b: Builder, w: Expr, afresh: Expr, rate: float, h: float, rule: Ru
         Scan interval [s].
     rule : Rule
         Scan rule.
+    from_zero : bool
+        Whether the signal before the first one counts as zero.
     """
     if rule is not Rule.TRAPEZOIDAL:
         return b.coefficient("ki_h", rate * h, "integral gain times h", "-") * w
     w1 = b.state("w1", "signal of the integral at the last scan")
     half = b.coefficient("ki_h2", rate * h / 2, "integral gain times h/2", "-")
-    b.let("w1", select(afresh, w, w1), "no step from nothing to the first sample")
+    first = select(b.fresh, 0.0, w1) if from_zero else select(afresh, w, w1)
+    b.let("w1", first, "from zero at power-up" if from_zero else "no step from nothing to the first sample")
+    b.let("w_old", w1, "signal of the last increment")
     grown = b.let("dI", half * (w + w1), "increment of the integral, trapezoidal (section 4)")
     b.let("w1", w, "kept for the next scan")
     return grown

@@ -31,7 +31,7 @@ def dahlin(b: Builder, a: Algorithm, h: float, sign: float, t: Terms) -> None:
     last = output.kept(b, a, t.u)
     past = [b.state(f"u{n}", f"output {n + 1} scans ago") for n in range(1, delay + 1)]
     for state in past:
-        b.let(state.id, select(t.on, state, last), "at a transfer the history is the last output (section 6)")
+        b.let(state.id, select(b.fresh, last, state), "before the first scan the output was the initial one")
     e1 = b.state("e1", "error at the last scan")
     gain, pole = b.coefficient("g", sign * g, "gain on the error", "%/%"), b.coefficient("p", p, "pole of the process", "-")
     oldest = past[-1] if past else last

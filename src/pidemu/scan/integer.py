@@ -37,7 +37,7 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     ScanError
         The algorithm is not of this kind, or the scan interval is no whole number of ticks.
     """
-    if not a.velocity or a.series or a.c != 0 or a.b != 1 or a.integral_rule is not Rule.BACKWARD or not a.kp:
+    if not a.velocity or a.series or a.c != 0 or a.b != 1 or a.integral_rule is not Rule.BACKWARD or a.shape is not None:
         raise ScanError("integer arithmetic is defined for velocity PID in standard form, P on error and D on the measurement")
     manual = output.by_hand(b, a, t.u)
     counts = b.coefficient("counts", float(a.counts), "counts per percent", "1/%")

@@ -58,15 +58,15 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
     if a.accumulated and a.kp and a.b == 0:
         P, moved = _accumulated(b, a, t)
     scheme = _scheme(b, a)
-    holds_sum = bool(a.ki) or (a.start == "load-output" and a.keeps_load) or moved is not None
+    holds_sum = bool(a.ki) or (a.start == "load-output" and a.keeps_load) or moved is not None or a.limits_without_integral
     I: Expr | None = None  # noqa: E741 (the field's symbol)
     grown: Expr | None = None
     if holds_sum:
         state = b.state("I", "integral sum")
         grown = _growth(b, a, h, t) if a.ki else None
-        grown = _gated(b, a, t, scheme, P, state, grown, last)
+        grown = _gated(b, a, t, scheme, P, state, grown, last if a.start == "running" else t.u)
         needed = scheme.state(blocks.difference(scheme.total(t.u if feed is None else t.u - feed), P, t.D))
-        I = scheme.term(_integral(b, a, t, needed, scheme, state, grown, moved))  # noqa: E741
+        I = scheme.term(_integral(b, a, t, needed, scheme, P, state, grown, moved))  # noqa: E741
     elif bias:
         I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
     total = scheme.output(blocks.summed([P, I, t.D]))
@@ -80,6 +80,8 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
     if after is not None:
         v = b.let("v_all", v + after, "sum of the terms and feedforward")
     final = output.stepped(b, a, t, out)
+    if a.zero_first_output:
+        final = b.let("out_1", select(b.fresh, 0.0, final), "the first scan only prepares the block (section 6)")
     if holds_sum and a.ki:
         _after_output(b, a, h, t, scheme, P, v, out, grown)
         _in_manual(b, a, t, scheme, P, manual)
@@ -115,10 +117,10 @@ def _accumulated(b: Builder, a: Algorithm, t: Terms) -> tuple[Expr, Expr | None]
 def _growth(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     """Return what the integral's state grows by (section 4); nothing within the integral's deadband (section 8)."""
     rate = {"ki e": a.ki, "e/Ti": a.ki / a.kp if a.kp else 0.0, "e": 1.0}[a.holds]
-    grown = blocks.increment(b, t.w, t.fresh, rate, h, a.integral_rule)
+    grown = blocks.increment(b, t.w, t.fresh, rate, h, a.integral_rule, from_zero=a.integral_from_zero)
     if a.integral_deadband is not None:
         band = b.coefficient("i_band", a.integral_deadband, "integral deadband", "%")
-        inside = blocks.magnitude(t.signals.e) <= band
+        inside = b.let("i_still", select(blocks.magnitude(t.signals.e) <= band, 1.0, 0.0), "within the integral's deadband") > 0.0
         grown = b.let("dI", select(inside, 0.0, grown), "no integration within the integral's deadband (section 8)")
     return grown
 
@@ -133,14 +135,8 @@ def _gated(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Nam
         factor = b.coefficient("fast", a.gate.fast_return, "factor on the way back from a limit", "-")
         returns = ((last >= t.high) & (pushes < 0.0)) | ((last <= t.low) & (pushes > 0.0))
         b.let("dI", select(returns, factor * grown, grown), "fast return from a limit (section 5)")
-    if a.windup == "freeze":
-        if a.gate.without_derivative:
-            last = b.state("inner", "sum without the derivative at the last scan")
-        stop = blocks.at_limit(last, t.low, t.high) if a.gate.both else blocks.held_at_limit(last, t.low, t.high, pushes)
-        if a.gate.without_derivative:
-            stop = equal(b.state("begun", "there has been a scan", "-"), 1.0) & stop
-        text = "while the last output is at a limit" if a.gate.both else "that pushes further while the last output is at a limit"
-        return b.let("dI", select(stop, 0.0, grown), f"freeze: none {text} (section 5)")
+    if a.windup == "freeze" and not a.gate.this_scan:
+        return _frozen(b, a, t, state, grown, pushes, last)
     if a.windup == "conditional":
         ahead = state if a.integral_rule is Rule.FORWARD else state + grown
         v0 = b.let("v0", scheme.output(blocks.summed([P, scheme.term(ahead), t.D])), "sum with this increment")
@@ -152,11 +148,33 @@ def _gated(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Nam
     return grown
 
 
+def _frozen(b: Builder, a: Algorithm, t: Terms, state: Name, grown: Expr, pushes: Expr, last: Name) -> Expr:
+    """Stop the integral while the last output, or the last sum without the derivative, stands at a limit (section 5, freeze)."""
+    g = a.gate
+    if g.without_derivative:
+        last = b.state("inner", "sum without the derivative at the last scan")
+    at_limit = blocks.at_limit(last, t.low, t.high)
+    if g.both:
+        stop, text = at_limit, "none"
+    elif g.unless_smaller:
+        stop, text = at_limit & (state * grown >= 0.0), "none that makes the integral larger"
+    else:
+        stop, text = blocks.held_at_limit(last, t.low, t.high, pushes), "none that pushes further"
+    if g.without_derivative or a.zero_power_up:
+        stop = equal(b.state("begun", "there has been a scan", "-"), 1.0) & stop
+    if g.from_integrated and a.integral_rule is Rule.TRAPEZOIDAL:
+        b.let("w1", select(stop, Name("w_old"), Name("w1")), "the last signal that was integrated")
+    return b.let("dI", select(stop, 0.0, grown), f"freeze: {text} while the last output is at a limit (section 5)")
+
+
 def _integral(
-    b: Builder, a: Algorithm, t: Terms, needed: Expr, scheme: _Sum, state: Name, grown: Expr | None, moved: Expr | None
+    b: Builder, a: Algorithm, t: Terms, needed: Expr, scheme: _Sum, P: Expr, state: Name, grown: Expr | None, moved: Expr | None
 ) -> Expr:
     """Set the integral at a transfer, let it grow otherwise (section 6)."""
     now = None if a.integral_rule is Rule.FORWARD else grown
+
+    if a.gate.this_scan:
+        b.let("I_old", state, "integral before this scan's increment")
 
     def grow(base: Expr, holds: bool = False) -> Expr:
         total = base if now is None or holds else base + now
@@ -188,6 +206,8 @@ def _integral(
     elif a.start in ("keep", "running"):
         b.let("I", select(b.fresh, needed, state), "the first scan is a transfer from the initial output (section 6)")
     _limit(b, a, t, state)
+    if a.windup == "recompute" and a.gate.without_derivative and a.ki:
+        _recomputed(b, a, t, scheme, P, None, state)
     return state
 
 
@@ -223,9 +243,15 @@ def _after_output(
             outside = Name("reset")
             seen = b.let("seen", select(equal(outside, outside), outside, out), "external reset in place of the output (section 5)")
         back = b.coefficient("back", _share(a, h), "share of the cut-off taken out of the integral per scan", "-")
-        b.let("I", state + scheme.state(scheme.total(back * (seen - v))), f"{a.windup}, Tt = {a.tracking_time:.6g} s (section 5)")
-    if a.windup == "recompute":
-        _recomputed(b, a, t, scheme, P, v, state)
+        pulled = state + scheme.state(scheme.total(back * (seen - v)))
+        if a.integral_deadband is not None:
+            pulled = select(Name("i_still") > 0.0, state, pulled)
+        b.let("I", pulled, f"{a.windup}, Tt = {a.tracking_time:.6g} s (section 5)")
+    if a.windup == "recompute" and not a.gate.without_derivative:
+        _recomputed(b, a, t, scheme, P, t.D, state)
+    if a.windup == "freeze" and a.gate.this_scan:
+        beyond = (v > t.high) | (v < t.low)
+        b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
     if a.windup == "reset-outside-band":
         reach = blocks.magnitude(scheme.output(P if a.b == 1 else t.signals.e * b.coefficient("kp_band", a.kp, "gain", "%/%")))
         b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
@@ -243,14 +269,13 @@ def _share(a: Algorithm, h: float) -> float:
     """Return the share of the cut-off that is taken out of the integral per scan (section 5)."""
     if not a.tracking_time:
         return 1.0
-    implicit = a.windup == "external-reset" and a.integral_rule is Rule.BACKWARD
+    implicit = a.implicit_tracking or (a.windup == "external-reset" and a.integral_rule is Rule.BACKWARD)
     return h / (a.tracking_time + h) if implicit else h / a.tracking_time
 
 
-def _recomputed(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, v: Expr, state: Name) -> None:
-    """At a limit set the integral to what the limit leaves for it (section 5)."""
-    D = None if a.gate.without_derivative else t.D
-    total = v if D is t.D else b.let("v_PI", scheme.output(blocks.summed([P, scheme.term(state)])), "sum without the derivative")
+def _recomputed(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, D: Expr | None, state: Name) -> None:
+    """At a limit set the integral to what the limit leaves for it; with D ``None`` before the derivative is added (section 5)."""
+    total = b.let("v_I", scheme.output(blocks.summed([P, scheme.term(state), D])), "sum that is held against the limits")
     high = scheme.state(blocks.difference(scheme.total(t.high), P, D))
     low = scheme.state(blocks.difference(scheme.total(t.low), P, D))
     b.let("I", select(total >= t.high, high, select(total <= t.low, low, state)), "recompute: what the limit leaves (section 5)")

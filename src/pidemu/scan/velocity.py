@@ -6,7 +6,7 @@ from pidemu.algorithm import Algorithm
 from pidemu.card.models import Rule
 from pidemu.scan import blocks, output
 from pidemu.scan.blocks import Builder
-from pidemu.scan.program import Expr, select
+from pidemu.scan.program import Expr, Name, equal, select
 from pidemu.scan.terms import Terms
 
 
@@ -31,7 +31,10 @@ def velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     moved = blocks.summed(parts) if parts else 0.0
     du: Expr = b.let("du", select(t.on, moved, 0.0), "increment; none at a transfer, bumpless (section 6)")
     du = output.lagged(b, a, h, du, "du")
-    v = b.let("v", last + du, "last output and increment")
+    base: Expr = last
+    if a.reads_back and b.has("reset"):
+        base = b.let("base", select(equal(Name("reset"), Name("reset")), Name("reset"), last), "output read back (section 5)")
+    v = b.let("v", base + du, "last output and increment")
     out = output.within_limits(b, a, h, t, v, last)
     final = output.stepped(b, a, t, out)
     if last is not t.u:
@@ -70,7 +73,7 @@ def _of_the_mode(b: Builder, a: Algorithm, t: Terms, in_cascade: float) -> Expr:
 
 def _integral(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     """Return the increment of the integral (section 4)."""
-    grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral_rule)
+    grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral_rule, from_zero=a.integral_from_zero)
     if a.integral_deadband is not None:
         band = b.coefficient("i_band", a.integral_deadband, "integral deadband", "%")
         grown = b.let("dI", select(blocks.magnitude(t.signals.e) <= band, 0.0, grown), "integral deadband (section 8)")

@@ -1,0 +1,159 @@
+"""Yokogawa's fieldbus PID block: I-PD in automatic, PI-D in cascade, written with PV - SP as the manual has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pidemu
+from pidemu.scan.build import Action
+from tests.real.support import Floats, Signals, close, signals
+
+TOLERANCE = 1e-12
+"""Double precision: the output is a sum of 200 increments."""
+
+
+@dataclass(frozen=True)
+class Dials:
+    """The block's parameters."""
+
+    GAIN: float
+    RESET: float
+    RATE: float
+    PV_FTIME: float = 0.0
+
+    def card(self) -> pidemu.Settings:
+        values = {name: getattr(self, name) for name in ("GAIN", "RESET", "RATE", "PV_FTIME")}
+        return pidemu.load_card("yokogawa/fieldbus-pid").settings(values)
+
+
+@dataclass
+class Block:
+    """One block. The change dMV is that of a direct-acting loop, and is taken off otherwise."""
+
+    d: Dials
+    dT: float
+    action: Action
+    low: float
+    high: float
+    OUT: float
+    history: list[tuple[float, float]] = field(default_factory=list)  # PV and the setpoint in force, newest last
+    automatic: bool = False
+    size: float = field(default=1.0)
+
+    def scan(self, SP: float, IN: float, auto: bool, manual: float, CAS_IN: float) -> float:
+        d, dT = self.d, self.dT
+        cascade = auto and not np.isnan(CAS_IN)
+        SP = CAS_IN if cascade else SP
+        PV = IN if not self.history else (d.PV_FTIME * self.history[-1][0] + dT * IN) / (d.PV_FTIME + dT)
+        self.history = [*(self.history or [(PV, SP)] * 2), (PV, SP)][-3:]
+        (PV2, _), (PV1, SP1), _ = self.history
+        terms = (
+            d.GAIN * ((PV - SP) - (PV1 - SP1) if cascade else PV - PV1),
+            d.GAIN * dT / d.RESET * (PV - SP),
+            d.GAIN * d.RATE / dT * (PV - 2 * PV1 + PV2),
+        )
+        if not auto:
+            self.OUT = manual
+        else:
+            dMV = sum(terms) if self.automatic else 0.0  # none in the first automatic scan
+            self.OUT = min(max(self.OUT + (dMV if self.action == "direct" else -dMV), self.low), self.high)
+        self.automatic = auto
+        self.size = max(self.size, *map(abs, terms), d.GAIN * (abs(PV) + abs(SP)), d.GAIN * d.RATE / dT * abs(PV))
+        return self.OUT
+
+
+def remote(record: Signals, seed: int) -> Floats:
+    """Return a remote setpoint in spells of cascade, NaN between them."""
+    rng = np.random.default_rng(seed + 1)
+    out = np.full(len(record), np.nan)
+    for _ in range(4):
+        start = int(rng.integers(0, len(record)))
+        out[start : start + int(rng.integers(1, 40))] = rng.uniform(10, 90)
+    drift = rng.normal(0, 0.5, len(record)) * (rng.random(len(record)) < 0.3)
+    return (out + np.cumsum(drift)).round(3)
+
+
+def expected(block: Block, record: Signals, cascade: Floats) -> Floats:
+    columns = zip(record.sp, record.pv, record.auto > 0, record.manual, cascade, strict=True)
+    return np.array([block.scan(*row) for row in columns])
+
+
+dials = st.builds(
+    Dials,
+    GAIN=st.floats(0.05, 20),
+    RESET=st.floats(0.5, 1000) | st.floats(0.1, 10000),
+    RATE=st.just(0.0) | st.floats(0.1, 60),
+    PV_FTIME=st.just(0.0) | st.floats(0.1, 20),
+)
+
+
+@settings(max_examples=60)
+@given(
+    dials,
+    st.floats(0.1, 5),
+    st.sampled_from(["reverse", "direct"]),
+    st.sampled_from([(0.0, 100.0), (30.0, 60.0), (-1e9, 1e9)]),
+    st.integers(0, 10**6),
+)
+def test_the_card_equals_the_published_increments_in_every_mode(
+    d: Dials, dT: float, action: Action, bounds: tuple[float, float], seed: int
+) -> None:
+    record = signals(seed)
+    cascade = remote(record, seed)
+    block = Block(d, dT, action, *bounds, OUT=40.0)
+    want = expected(block, record, cascade)
+    ctl = pidemu.Controller(d.card(), scan=dT, action=action, output_limits=bounds, initial_output=40.0)
+    found = ctl.run(record.sp, record.pv, record.auto, record.manual, cascade=cascade)
+    assert close(found, want, TOLERANCE, 10 * block.size)
+
+
+@settings(max_examples=20)
+@given(dials, st.integers(0, 10**6))
+def test_scan_by_scan_a_loop_that_goes_into_cascade_only_later_is_the_same_as_in_one_run(d: Dials, seed: int) -> None:
+    record = signals(seed)
+    cascade = remote(record, seed)
+    whole = pidemu.Controller(d.card(), scan=1.0, initial_output=40.0)
+    single = pidemu.Controller(d.card(), scan=1.0, initial_output=40.0)
+    want = whole.run(record.sp, record.pv, record.auto, record.manual, cascade=cascade)
+    found = [
+        single.scan(r, y, auto=bool(a), manual=m, cascade=None if np.isnan(c) else c)
+        for r, y, a, m, c in zip(record.sp, record.pv, record.auto, record.manual, cascade, strict=True)
+    ]
+    assert close(found, want, TOLERANCE, 100 * d.GAIN * (1 + d.RATE))
+
+
+def test_a_change_of_mode_alone_does_not_move_the_output() -> None:
+    d = Dials(GAIN=5.0, RESET=10000.0, RATE=10.0)
+    ctl = pidemu.Controller(d.card(), scan=1.0, initial_output=40.0)
+    cascade = np.where(np.arange(30) // 10 == 1, 50.0, np.nan)  # the remote setpoint is the local one
+    assert ctl.run(50.0, np.full(30, 50.0), cascade=cascade) == pytest.approx([40.0] * 30, abs=1e-12)
+
+
+def test_a_remote_setpoint_that_differs_kicks_on_the_way_into_cascade_and_not_on_the_way_out() -> None:
+    d = Dials(GAIN=2.0, RESET=100.0, RATE=0.0)
+    ctl = pidemu.Controller(d.card(), scan=1.0, initial_output=40.0)
+    out = ctl.run(50.0, np.full(6, 50.0), cascade=[np.nan, np.nan, 53.0, 53.0, np.nan, np.nan])
+    integral = 2.0 / 100 * 3.0
+    assert np.diff(out) == pytest.approx([0.0, 2.0 * 3.0 + integral, integral, 0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("cascade", "kick"), [(False, 0.0), (True, 2.0)])
+def test_a_setpoint_change_is_answered_by_integral_action_in_automatic_and_by_a_kick_as_well_in_cascade(
+    cascade: bool, kick: float
+) -> None:
+    ctl = pidemu.Controller(Dials(GAIN=2.0, RESET=100.0, RATE=5.0).card(), scan=1.0, initial_output=40.0)
+    sp = np.array([50.0, 50.0, 51.0, 51.0])
+    out = ctl.run(sp, 50.0, cascade=sp) if cascade else ctl.run(sp, 50.0)
+    assert np.diff(out) == pytest.approx([0.0, kick + 0.02, 0.02], abs=1e-12)
+
+
+def test_the_load_is_answered_alike_in_both_modes() -> None:
+    pv = signals(4).pv
+    d = Dials(GAIN=1.5, RESET=30.0, RATE=4.0)
+    auto, cascade = (pidemu.Controller(d.card(), scan=1.0, output_limits=(-1e6, 1e6)) for _ in range(2))
+    assert close(cascade.run(50.0, pv, cascade=50.0), auto.run(50.0, pv), TOLERANCE, 1e5)
