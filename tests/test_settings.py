@@ -285,9 +285,11 @@ def test_settings_print_their_active_dials() -> None:
 def test_every_example_of_a_card_amounts_to_what_it_says(name: str) -> None:
     a_card = pidemu.load_card(name)
     for example in a_card.data.examples:
+        want = example.canonical
+        if want is None:
+            continue  # it states outputs, which the rules of cards run
         n0, n1, n2, d1, _ = a_card.settings(example.given).law().coefficients()
         kp = n1 - n0 * d1  # specs/equations.md, section 3, exact conversion to parallel
-        want = example.canonical
         # the card prints six digits
         assert (want.ki, want.kp, want.kd, want.Tf) == pytest.approx((n0, kp, n2 - kp * d1, d1), rel=5e-6, abs=5e-6)
 

@@ -234,13 +234,14 @@ def test_zero_and_infinity_stay_themselves_on_a_direct_dial(role: Role, unit: st
     assert math.inf == to_canonical(role, math.inf, UNITS[unit])
 
 
-def test_only_bands_and_integral_times_are_reciprocal() -> None:
+def test_only_bands_integral_times_and_frequencies_are_reciprocal() -> None:
     reciprocal = {(r, UNITS[u].dimension) for r, u in DIALS if is_reciprocal(r, UNITS[u])}
     assert {
         (Role.GAIN, Dimension.PERCENT),
         (Role.GAIN, Dimension.PV_UNITS),
         (Role.INTEGRAL, Dimension.TIME),
         (Role.INTEGRAL, Dimension.TIME_PER_REPEAT),
+        (Role.FILTER_TIME, Dimension.FREQUENCY),
     } == reciprocal
 
 

@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.card.load import Card
-from pidemu.settings import Settings
+from pidemu.checks.runs import working
+from pidemu.conversion.target import is_computed
+from pidemu.settings import Settings, is_active, limits
+from pidemu.units import Role
 from tests.helpers import WIDE, settings_of
 
 Floats = npt.NDArray[np.float64]
@@ -59,6 +62,16 @@ def continuous(settings: Settings, w: Floats, *, setpoint: bool = False) -> Comp
     if not setpoint:
         return np.asarray(K * (1 + rate / s) * lead)
     return np.asarray(K * (b + rate / s + (1 + rate / s) * c * (lead - 1)))
+
+
+def needed(card: Card, options: dict[str, object] | None = None) -> dict[str, object]:
+    """Values for the dials that a conversion does not compute and the card has no default for."""
+    equation = card.variant(options).equation
+    return {
+        n: working(*limits(s))
+        for n, s in equation.settings.items()
+        if s.default is None and is_active(equation, n, s) and not is_computed(equation, n, Role(s.sets)) and s.sets != "multiplier"
+    }
 
 
 def settings_that_act(data: st.DataObject, card: Card) -> Settings:

@@ -16,7 +16,7 @@ from pidemu.conversion.alternatives import better_options
 from pidemu.conversion.certificate import Certificate, Rounded, Verdict
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.solve import Match, Solver
-from pidemu.conversion.target import Target
+from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.plain import json_safe
 from pidemu.settings import Settings, Value, limits
@@ -209,6 +209,7 @@ def convert(
 
     def solver(named: Mapping[str, object]) -> Solver:
         goal = Target(card, named, fixed, pv_range or source.pv_range, op_range or source.op_range)
+        goal.reject_missing()
         return Solver(source, goal, -factor if _is_negative(source, goal) else factor, scans)
 
     work = solver(chosen)
@@ -266,10 +267,14 @@ def _is_negative(source: Settings, target: Target) -> bool:
 
 
 def _shared(source: Settings, target: Card) -> dict[str, object]:
-    """Return what stays as it is within one card: an overall multiplier, and settings that many loops share."""
+    """Return what stays as it is within one card: whatever a conversion does not compute, and settings that many loops share."""
     if source.card.id != target.id:
         return {}
-    return {n: v.value for n, v in source.items() if v.active and (v.role is Role.MULTIPLIER or v.setting.scope == "module")}
+    return {
+        n: v.value
+        for n, v in source.items()
+        if v.active and (v.setting.scope == "module" or not is_computed(source.equation, n, v.role))
+    }
 
 
 def _textbook(solver: Solver) -> Textbook:

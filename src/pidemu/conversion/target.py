@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import gain_sign
 from pidemu.card.load import Card, Variant
-from pidemu.card.models import Form, Setting
+from pidemu.card.models import Equation, Form, Setting
 from pidemu.errors import SettingError
 from pidemu.settings import Settings, is_active, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
 FilterKind = Literal["none", "time", "ratio", "gain"]
+
+_CORE: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+_WEIGHTS: Final = (Role.PROPORTIONAL_WEIGHT, Role.DERIVATIVE_WEIGHT)
+
+
+def is_computed(equation: Equation, name: str, role: Role) -> bool:
+    """Tell whether a conversion sets a dial: a term's, the derivative's filter or a setpoint weight."""
+    return role in _CORE or is_settled_later(equation, name, role)
+
+
+def is_settled_later(equation: Equation, name: str, role: Role) -> bool:
+    """Tell whether a conversion sets a dial only where something depends on it."""
+    filt = equation.derivative.filter
+    return role in _WEIGHTS or (filt is not None and name in (filt.ratio, filt.gain, filt.time))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +163,7 @@ class Target:
         for name in self.given:
             if name not in self.variant.equation.settings:
                 self.template(**{name: self.given[name]})  # says what is wrong with the name
-            elif Role(self.variant.equation.settings[name].sets) in (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE):
+            elif Role(self.variant.equation.settings[name].sets) in _CORE:
                 raise SettingError(f"{self.card.id}: {name} is what the conversion computes; it cannot be given")
 
     def dial(self, role: Role) -> tuple[str, Setting] | None:
@@ -219,7 +233,37 @@ class Target:
         SettingError
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
-        return self.card.settings({**self.options, **self.given, **self._dials(n), **self.ranges})
+        return self.card.settings({**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges})
+
+    def _idle(self) -> dict[str, object]:
+        """Return values for filter and weights that have no default, where nothing depends on them."""
+        found: dict[str, object] = {}
+        for name, setting in self._without_default():
+            if is_settled_later(self.variant.equation, name, Role(setting.sets)):
+                found[name] = 1.0 if Role(setting.sets) in _WEIGHTS else _placeholder(setting)
+        return found
+
+    def _without_default(self) -> Iterator[tuple[str, Setting]]:
+        for name, setting in self.variant.equation.settings.items():
+            if setting.default is None and is_active(self.variant.equation, name, setting):
+                yield name, setting
+
+    def reject_missing(self) -> None:
+        """Refuse to go on where a dial is neither computed by a conversion nor given, and has no default.
+
+        Raises
+        ------
+        SettingError
+            Naming these dials.
+        """
+        equation = self.variant.equation
+        idle = [n for n, s in self._without_default() if not is_computed(equation, n, Role(s.sets)) and n not in self.given]
+        missing = [n for n in idle if equation.settings[n].sets != Role.MULTIPLIER]
+        if missing:
+            raise SettingError(
+                f"{self.card.id}: a conversion does not compute {' and '.join(missing)}, and the card has no default; "
+                f"give {'it' if len(missing) == 1 else 'them'}, with --set {missing[0]}=VALUE"
+            )
 
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
@@ -266,7 +310,7 @@ class Target:
     def _to_dial(self, name: str, setting: Setting, value: float) -> float:
         role = Role(setting.sets)
         off = off_values(setting)
-        if value == 0 and role in (Role.INTEGRAL, Role.DERIVATIVE):
+        if value == 0 and role in (Role.INTEGRAL, Role.DERIVATIVE, Role.FILTER_TIME):
             if off:
                 return off[0]
             if role is Role.INTEGRAL:
@@ -283,6 +327,8 @@ class Target:
             return {}
         if f.kind == "ratio":
             return {f.setting: self._in_reach(f.setting, setting, Tf / base)}
+        if Tf == 0 and off_values(setting):
+            return {f.setting: off_values(setting)[0]}
         if Tf == 0:
             raise SettingError(f"{f.setting} would have to be infinite: this target always filters its derivative")
         return {f.setting: self._in_reach(f.setting, setting, base / Tf)}
