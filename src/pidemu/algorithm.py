@@ -127,7 +127,7 @@ class Dahlin:
     wanted: float
 
     def numbers(self, h: float) -> tuple[float, float, float, int]:
-        """Return ``g``, ``p``, ``q`` and ``N`` of ``u_n = q u_(n-1) + (1-q) u_(n-N-1) + g (e_n - p e_(n-1))`` at interval `h` [s]."""
+        """Return ``g, p, q, N`` of ``u_n = q u_(n-1) + (1-q) u_(n-N-1) + g (e_n - p e_(n-1))`` at a scan interval `h` [s]."""
         q = math.exp(-h / self.wanted) if self.wanted else 0.0
         p = math.exp(-h / self.time) if self.time else 0.0
         return (1 - q) / (self.gain * (1 - p)), p, q, round(self.delay / h)
@@ -336,8 +336,8 @@ def check_filters(a: Algorithm, h: float) -> None:
     Raises
     ------
     ScanError
-        The forward rule with ``0 < Tf <= h/2``, or with ``0 < Tf <= h`` for the second-order filter; the lagged-difference rule without
-        a filter; the four-point rule with one.
+        The forward rule with ``0 < Tf <= h/2``, or with ``0 < Tf <= h`` for the second-order filter; the lagged-difference rule
+        without a filter; the four-point rule with one.
     """
     if a.derivative_rule is Rule.LAGGED_DIFFERENCE and a.kd and not a.has_term_filter:
         raise ScanError("the lagged-difference rule needs a filter on the derivative term")

@@ -8,8 +8,18 @@ from typing import Any
 
 from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
 from pidemu.card.models import (
-    Equation, ErrorShape, Filter, Form, IntegralLimits, Rule, SignalFilter, WindupBackCalculation, WindupExternalReset,
-    WindupGate, WindupRecompute,
+    Equation,
+    ErrorShape,
+    Filter,
+    Form,
+    IntegralLimits,
+    Measurement,
+    Rule,
+    Setpoint,
+    WindupBackCalculation,
+    WindupExternalReset,
+    WindupGate,
+    WindupRecompute,
 )  # fmt: skip
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
@@ -221,8 +231,9 @@ def _transfer(equation: Equation) -> dict[str, Any]:
     }
 
 
-def _lag(read: _Reader, filt: SignalFilter | None, h: float) -> Lag | None:
-    """Return a signal's filter, or ``None`` where it is off."""
+def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
+    """Return a signal's filter, or ``None`` where there is none or it is off."""
+    filt = None if signal is None else signal.filter
     if filt is None:
         return None
     if filt.factor is None:
@@ -257,17 +268,17 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
 
 def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
-    cascade = equation.cascade and equation.cascade.proportional
+    cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
     other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
     return {
-        "sp_filter": _lag(read, sp and sp.filter, h),
-        "sp_rate": read.pick(sp and sp.rate, math.inf),
+        "sp_filter": _lag(read, sp, h),
+        "sp_rate": math.inf if sp is None else read.pick(sp.rate, math.inf),
         "sp_from_zero": sp is not None and sp.starts == "zero",
         "sp_tracks": sp is not None and sp.tracks,
-        "pv_filter": _lag(read, pv and pv.filter, h),
+        "pv_filter": _lag(read, pv, h),
         "previous_pv": pv is not None and pv.previous_scan,
-        "e_filter": _lag(read, error and error.filter, h),
+        "e_filter": _lag(read, error, h),
         "shape": _shape(read, equation),
         "cascade_b": None if other_b == b else other_b,
         "feedforward": None if ff is None else read.pick(ff.gain, 0.0),

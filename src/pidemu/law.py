@@ -107,7 +107,8 @@ def _before_the_algorithm(a: Algorithm, op: Operators, feedback: Any, setpoint: 
 
 def _no_continuous_law(d: Dahlin) -> Any:
     raise UndefinedError(
-        f"pole cancellation for a dead time of {d.delay:g} s is a recursion in scans and has no continuous law; give a scan interval"
+        f"pole cancellation for a dead time of {d.delay:g} s is a recursion in scans and has no continuous law; give a scan "
+        f"interval"
     )
 
 

@@ -15,7 +15,8 @@ all others          the plain ratio                         1
 =================== ======================================= =========
 
 Unit conversion is exact rational arithmetic, rounded once, so that 4 repeats per minute are 15 s per repeat and not
-15.000000000000002. A card that computes in engineering units has its levels and rates in those. Infinity is a value of the integral time (no integral action); zero is its reset rate.
+15.000000000000002. A card that computes in engineering units has its levels and rates in those. Infinity is a value of the
+integral time (no integral action); zero is its reset rate.
 """
 
 from __future__ import annotations

@@ -102,8 +102,8 @@ class Evidence(Model):
     """Where a statement of the card comes from, and how sure it is."""
 
     status: Status = Field(
-        description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` "
-        "(it follows from something documented) or `assumed` (nobody says so; shown wherever a result rests on it)."
+        description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
+        "from something documented) or `assumed` (nobody says so; shown wherever a result rests on it)."
     )
     source: Text | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
     at: Text | None = Field(
@@ -142,8 +142,8 @@ class SignalFilter(Model):
     )
     factor: Reference | None = Field(
         default=None,
-        description="Share k of the new sample per scan, `f += k (x - f)`, from above 0 to 1 (no filter): a number, or the name of a "
-        "setting. The filter time goes with the scan interval, `Tf = h (1 - k)/k`.",
+        description="Share k of the new sample per scan, `f += k (x - f)`, from above 0 to 1 (no filter): a number, or the name "
+        "of a setting. The filter time goes with the scan interval, `Tf = h (1 - k)/k`.",
     )
     rule: GeneralRule = Field(default=Rule.BACKWARD, description="Scan rule.")
 
@@ -167,8 +167,8 @@ class Setpoint(Model):
     )
     tracks: Flag = Field(
         default=False,
-        description="Whether the setpoint follows the measurement in manual, and stays there after the transfer until the setpoint is "
-        "changed.",
+        description="Whether the setpoint follows the measurement in manual, and stays there after the transfer until the "
+        "setpoint is changed.",
     )
 
 
@@ -180,8 +180,8 @@ class ErrorShape(Model):
     )
     shape: Literal["linear", "gap", "squared", "gain-linear"] = Field(
         default="linear",
-        description="`linear`. `gap`: within `band` of zero the error counts with `gain`; with a gain of 0 that is a deadband. `squared`: "
-        "`e |e|/over`. `gain-linear`: `e (L + (1 - L) |e|/over)` with L = `linearity`.",
+        description="`linear`. `gap`: within `band` of zero the error counts with `gain`; with a gain of 0 that is a deadband. "
+        "`squared`: `e |e|/over`. `gain-linear`: `e (L + (1 - L) |e|/over)` with L = `linearity`.",
     )
     band: Reference | None = Field(default=None, description="Half width of the band [as the measurement], with `gap`.")
     gain: Reference = Field(default=0.0, description="Gain within the band, with `gap`: a number, or the name of a setting.")
@@ -214,9 +214,8 @@ class WindupClamp(Model):
     """The integral sum is limited."""
 
     scheme: Literal["clamp", "clamp-sum"] = Field(
-        description="`clamp`: limit the integral sum to the output limits, before it is used. `clamp-sum`: the same for "
-        "an accumulator "
-        "that also holds P on PV."
+        description="`clamp`: limit the integral sum to the output limits, before it is used. `clamp-sum`: the same for an "
+        "accumulator that also holds P on PV."
     )
     without_integral: Literal["zero", "limited"] = Field(
         default="zero",
@@ -233,26 +232,28 @@ class WindupGate(Model):
     )
     judged_on: Literal["output", "sum-without-derivative", "sum"] = Field(
         default="output",
-        description="What `freeze` looks at: the last output; P + I of the last scan, before the derivative was added; or this scan's sum "
-        "with the increment, which then counts for the output but is not kept.",
+        description="What `freeze` looks at: the last output; P + I of the last scan, before the derivative was added; or this "
+        "scan's sum with the increment, which then counts for the output but is not kept.",
     )
     direction: Literal["further", "both", "unless-smaller"] = Field(
         default="further",
-        description="With `freeze`: stop only what pushes further; stop the integral whichever way it would move; or stop it unless its size "
-        "becomes smaller.",
+        description="With `freeze`: stop only what pushes further; stop the integral whichever way it would move; or stop it "
+        "unless its size becomes smaller.",
     )
     resumes_from: Literal["last", "last-integrated"] = Field(
         default="last",
-        description="With `freeze` and the trapezoidal rule: after a freeze the increment starts from the last error, or from the last one that "
-        "was integrated.",
+        description="With `freeze` and the trapezoidal rule: after a freeze the increment starts from the last error, or from the "
+        "last one that was integrated.",
     )
     test: Literal["increment", "error-times-output"] = Field(
         default="increment",
-        description="What `conditional` takes for pushing further: the sign of the increment, or that of error times the sum before limits.",
+        description="What `conditional` takes for pushing further: the sign of the increment, or that of error times the sum "
+        "before limits.",
     )
     fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
         default=1.0,
-        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by this.",
+        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by "
+        "this.",
     )
 
 
@@ -262,7 +263,8 @@ class WindupRecompute(Model):
     scheme: Literal["recompute"] = Field(description="Where the sum reaches a limit: `I = limit - P - D`, after the output.")
     without_derivative: Flag = Field(
         default=False,
-        description="Whether the derivative comes last: `P + I` is limited, with `I = limit - P`, then D is added and the sum limited again.",
+        description="Whether the derivative comes last: `P + I` is limited, with `I = limit - P`, then D is added and the sum "
+        "limited again.",
     )
     clamped: Flag = Field(default=False, description="Whether the integral is limited to the output limits as well.")
 
@@ -297,13 +299,14 @@ class WindupExternalReset(Model):
     """Integral by positive feedback."""
 
     scheme: Literal["external-reset"] = Field(
-        description="The integral is a first-order lag, of the integral time, fed with the limited output less the other terms: it "
-        "stands still while the output stands at a limit. Backward and forward rules only. An external reset signal takes the "
+        description="The integral is a first-order lag, of the integral time, fed with the limited output less the other terms: "
+        "it stands still while the output stands at a limit. Backward and forward rules only. An external reset signal takes the "
         "place of the limited output."
     )
     fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
         default=1.0,
-        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by this.",
+        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by "
+        "this.",
     )
 
 
@@ -316,7 +319,8 @@ class WindupVelocity(Model):
     )
     reads_back: Flag = Field(
         default=False,
-        description="Whether the increment is added to the external reset signal, the output read back from downstream, where there is one.",
+        description="Whether the increment is added to the external reset signal, the output read back from downstream, where "
+        "there is one.",
     )
 
 
@@ -361,7 +365,8 @@ class Integral(Model):
     )
     starts: Literal["sample", "zero"] = Field(
         default="sample",
-        description="With the trapezoidal rule: at power-up the previous error is the first one, or zero, so that half of the first counts.",
+        description="With the trapezoidal rule: at power-up the previous error is the first one, or zero, so that half of the "
+        "first counts.",
     )
     deadband: Reference | None = Field(
         default=None,
@@ -374,9 +379,8 @@ class Filter(Model):
     """The filter that goes with the derivative."""
 
     applies_to: Literal["term", "lead-lag", "measurement", "output"] = Field(
-        description="`term`: the derivative term alone. `lead-lag` (series form): `(1 + Td s)/(1 + alpha Td s)`. "
-        "`measurement`: the whole "
-        "measurement path, P and I as well. `output`: the sum of the terms."
+        description="`term`: the derivative term alone. `lead-lag` (series form): `(1 + Td s)/(1 + alpha Td s)`. `measurement`: "
+        "the whole measurement path, P and I as well. `output`: the sum of the terms."
     )
     order: Literal[1, 2] = Field(
         default=1,
@@ -384,8 +388,8 @@ class Filter(Model):
     )
     ratio: SettingName | Number | None = Field(
         default=None,
-        description="`Tf` as a multiple of the derivative dial's time: a number, or the name of a setting. Exactly one "
-        "of `ratio`, `gain`, `time`.",
+        description="`Tf` as a multiple of the derivative dial's time: a number, or the name of a setting. Exactly one of "
+        "`ratio`, `gain`, `time`.",
     )
     gain: SettingName | Number | None = Field(
         default=None, description="Derivative gain N, the inverse of `ratio`: a number, or the name of a setting."
@@ -393,9 +397,8 @@ class Filter(Model):
     time: SettingName | Number | None = Field(default=None, description="`Tf` itself: seconds, or the name of a setting.")
     of: Literal["derivative", "effective-derivative"] = Field(
         default="derivative",
-        description="The time that `ratio` or `gain` refers to: the derivative setting, or `Ti Td/(Ti + Td)`, the "
-        "derivative time of the "
-        "equivalent standard form.",
+        description="The time that `ratio` or `gain` refers to: the derivative setting, or `Ti Td/(Ti + Td)`, the derivative time "
+        "of the equivalent standard form.",
     )
     rule: GeneralRule | None = Field(
         default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."
@@ -414,12 +417,13 @@ class Derivative(Model):
     )
     rule: Rule = Field(
         default=Rule.BACKWARD,
-        description="Scan rule of the filtered derivative (specs/equations.md, section 4). Without a filter the "
-        "derivative is the backward difference; `lagged-difference` has none without a filter, `four-point` has no filter.",
+        description="Scan rule of the filtered derivative (specs/equations.md, section 4). Without a filter the derivative is the "
+        "backward difference; `lagged-difference` has none without a filter, `four-point` has no filter.",
     )
     starts: Literal["sample", "zero"] = Field(
         default="sample",
-        description="At power-up the previous signal is the first sample, so that nothing moves, or zero, so that the first scan kicks.",
+        description="At power-up the previous signal is the first sample, so that nothing moves, or zero, so that the first scan "
+        "kicks.",
     )
     filter: Filter | None = Field(default=None, description="The filter; none if absent.")
 
@@ -434,7 +438,8 @@ class Feedforward(Model):
     """A feedforward input."""
 
     summed: Literal["before-limits", "after-limits"] = Field(
-        description="Where the feedforward signal is added: to the sum before the output limits, or to the limited output, which is limited again."
+        description="Where the feedforward signal is added: to the sum before the output limits, or to the limited output, which "
+        "is limited again."
     )
     gain: Reference = Field(default=1.0, description="Gain of the feedforward signal: a number, or the name of a setting.")
 
@@ -443,17 +448,17 @@ class Transfer(Model):
     """What happens when the controller is put into automatic, and in manual before that."""
 
     start: Literal["bumpless", "load-output", "tracked", "keep", "zero", "running"] = Field(
-        description="`bumpless`: the first automatic output equals the last output, `I = u - P - D`. `load-output`: the "
-        "integral sum is "
-        "loaded with the last output and the terms come on top, a bump of `P + D`. `tracked`: in manual the integral is set every scan "
-        "to what the output leaves for it, and the first automatic scan moves on from there. `keep`: the integral stands as it stood. "
-        "`zero`: it starts at zero. `running`: the algorithm runs on in manual, and only its output is not used."
+        description="`bumpless`: the first automatic output equals the last output, `I = u - P - D`. `load-output`: the integral "
+        "sum is loaded with the last output and the terms come on top, a bump of `P + D`. `tracked`: in manual the integral is "
+        "set every scan to what the output leaves for it, and the first automatic scan moves on from there. `keep`: the integral "
+        "stands as it stood. `zero`: it starts at zero. `running`: the algorithm runs on in manual, and only its output is not "
+        "used."
     )
     derivative: Literal["running", "restarted", "zeroed", "preset"] = Field(
         default="running",
-        description="`running`: filters and differences go on in manual. `restarted`: they start afresh at the transfer. `zeroed`: at the "
-        "transfer the previous signal counts as zero, so that the derivative kicks. `preset`: in manual the history is the present "
-        "sample and the term is zero.",
+        description="`running`: filters and differences go on in manual. `restarted`: they start afresh at the transfer. "
+        "`zeroed`: at the transfer the previous signal counts as zero, so that the derivative kicks. `preset`: in manual the "
+        "history is the present sample and the term is zero.",
     )
     without_integral: Literal["kept", "zero"] = Field(
         default="kept",
@@ -481,8 +486,8 @@ class Transfer(Model):
     )
     changes: Literal["as-held", "bumpless"] = Field(
         default="as-held",
-        description="A setting changed in automatic: the new setting acts on what the integral holds (`integral.holds`), or the integral is "
-        "set so that the output does not move.",
+        description="A setting changed in automatic: the new setting acts on what the integral holds (`integral.holds`), or the "
+        "integral is set so that the output does not move.",
     )
 
 
@@ -491,8 +496,8 @@ class Faults(Model):
 
     signal: Literal["hold", "propagate", "nan", "zero"] = Field(
         default="hold",
-        description="Setpoint or measurement is NaN or infinite: `hold` the output, nothing is computed and the state stands still; "
-        "`propagate`: it is computed with; `nan`, `zero`: that is the output for this scan, and the state stands still.",
+        description="Setpoint or measurement is NaN or infinite: `hold` the output, nothing is computed and the state stands "
+        "still; `propagate`: it is computed with; `nan`, `zero`: that is the output for this scan, and the state stands still.",
     )
     zero_interval: Literal["hold", "compute"] = Field(
         default="hold", description="An interval of zero: nothing is done and the last output stands, or it is computed with."
@@ -506,12 +511,13 @@ class Arithmetic(Model):
     """How numbers are computed."""
 
     type: Literal["float64", "float32", "integer"] = Field(
-        description="`float32`: every operation is rounded to 24 bits. `integer`: counts, with carried remainders (specs/equations.md, section 7)."
+        description="`float32`: every operation is rounded to 24 bits. `integer`: counts, with carried remainders "
+        "(specs/equations.md, section 7)."
     )
     literals: Literal["float32", "float64"] = Field(
         default="float32",
-        description="With `float32`: the width of the numbers written in the program; an operation with a `float64` literal is computed "
-        "in float64 until it is stored.",
+        description="With `float32`: the width of the numbers written in the program; an operation with a `float64` literal is "
+        "computed in float64 until it is stored.",
     )
     counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
         default=None, description="With `integer`: counts per percent of setpoint, measurement and output."
@@ -536,9 +542,8 @@ class Setting(Model):
     about: Text | None = Field(default=None, description="The vendor's own name or words for it.")
     default: Number | None = Field(
         default=None,
-        description="Value taken when the setting is not given. Either the vendor's delivered value (then with "
-        "evidence), or the value that "
-        "switches the term off, or leaves it as it is.",
+        description="Value taken when the setting is not given. Either the vendor's delivered value (then with evidence), or the "
+        "value that switches the term off, or leaves it as it is.",
     )
     range: tuple[Number, Number] | None = Field(
         default=None, description="Smallest and largest value, in `unit`; off values may lie outside."
@@ -581,15 +586,15 @@ class Action(Model):
 
     fixed: Flag = Field(
         default=False,
-        description="Whether there is no choice of action: the error is always the one under `reverse`, and the sign of the gain decides. With "
-        "`pv - sp` a negative gain is reverse acting.",
+        description="Whether there is no choice of action: the error is always the one under `reverse`, and the sign of the gain "
+        "decides. With `pv - sp` a negative gain is reverse acting.",
     )
 
     reverse: Literal["sp - pv", "pv - sp"] = Field(
         default="sp - pv",
-        description="The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` "
-        "means the vendor writes the "
-        "direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all the same.",
+        description="The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` means the "
+        "vendor writes the direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all "
+        "the same.",
     )
     names: dict[Literal["reverse", "direct"], Text] = Field(
         description="The vendor's words for reverse acting (output falls when the measurement rises) and direct acting."
@@ -603,7 +608,8 @@ class Scan(Model):
     default: Text = Field(description="Interval used when none is given, such as `1 s`.")
     interval: Literal["nominal", "measured"] = Field(
         default="nominal",
-        description="What the equations use where scans come unevenly: the nominal interval, or the one measured since the last scan.",
+        description="What the equations use where scans come unevenly: the nominal interval, or the one measured since the last "
+        "scan.",
     )
 
 
@@ -651,8 +657,8 @@ class Example(Model):
     )
     outputs: list[Number] | None = Field(
         default=None,
-        description="The output of the first automatic scans after a setpoint step of 1 from rest at 50, less the output before, at the "
-        "card's scan interval and without limits; to six digits.",
+        description="The output of the first automatic scans after a setpoint step of 1 from rest at 50, less the output before, "
+        "at the card's scan interval and without limits; to six digits.",
     )
     source: Text | None = Field(
         default=None,
@@ -675,8 +681,8 @@ class Equation(Model):
         "(specs/equations.md, section 4)."
     )
     implementation: Literal["positional", "velocity"] = Field(
-        description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the "
-        "last limited output."
+        description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the last limited "
+        "output."
     )
     setpoint: Setpoint | None = Field(
         default=None, description="What is done to the setpoint before the algorithm; nothing if absent."
@@ -713,8 +719,7 @@ class CardFile(Equation):
     options: dict[SettingName, Option] = Field(default={}, description="What the vendor lets you choose per loop.")
     evidence: dict[Text, Evidence] = Field(
         description="Where each statement comes from: a path in the card, such as `derivative.filter` or "
-        "`options.FORM.choices.Series`, "
-        "covers everything below it; the longest path wins."
+        "`options.FORM.choices.Series`, covers everything below it; the longest path wins."
     )
     quirks: list[Quirk] = Field(default=[], description="Facts worth knowing that the equation does not show.")
     examples: list[Example] = Field(min_length=1, description="Settings and what they amount to; every one is run.")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.load import Variant, dotted, variants
-from pidemu.card.models import GENERAL_RULES, Equation, WindupBackCalculation, WindupGate
+from pidemu.card.models import GENERAL_RULES, Equation, Rule, WindupBackCalculation, WindupGate
 from pidemu.card.source import Path_
 from pidemu.errors import PidemuError, Problem, suggest
 from pidemu.settings import limits, off_values
@@ -232,7 +232,7 @@ def reject_bad_arithmetic(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, "'counts' and 'gain-counts' go with type 'integer'", at_key=True)
     if a.type != "float32" and a.literals != "float32":
         yield document.problem(home, "'literals' belongs to type 'float32'", at_key=True)
-    fits = equation.form == "standard" and equation.implementation == "velocity" and equation.integral.rule == "backward"
+    fits = equation.form == "standard" and equation.implementation == "velocity" and equation.integral.rule is Rule.BACKWARD
     fits = fits and equation.proportional.on == "error" and equation.derivative.on in ("pv", "none")
     if a.type == "integer" and not fits:
         message = "type 'integer' is defined for velocity, standard form, backward rule, P on error, D on pv"
@@ -296,7 +296,7 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
     scheme, home = equation.integral.windup.scheme, variant.home(("integral", "windup"))
     if (scheme == "velocity") != (equation.implementation == "velocity"):
         yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
-    if scheme == "external-reset" and equation.integral.rule == "trapezoidal":
+    if scheme == "external-reset" and equation.integral.rule is Rule.TRAPEZOIDAL:
         yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
     if scheme == "external-reset" and equation.integral.on != "none" and equation.proportional.on != "error":
         message = "external-reset needs P on the error: positive feedback of another P settles beyond the limit"

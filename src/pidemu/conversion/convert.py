@@ -237,7 +237,8 @@ def _refuse_recursions(source: Settings, target: Card) -> None:
     for card in (source.card, target):
         if card.data.form is Form.DAHLIN:
             raise ConversionRefusedError(
-                f"{card.id} cancels the pole of a process model and has no PID settings; tune the other card for that process instead"
+                f"{card.id} cancels the pole of a process model and has no PID settings; tune the other card for that process "
+                f"instead"
             )
 
 

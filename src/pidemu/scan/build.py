@@ -54,7 +54,8 @@ def build(
     initial_output : float
         Output before the first scan [as limits].
     signals : sequence of str
-        What the program reads besides setpoint, measurement, mode and the operator's output: ``"cascade"``, ``"track"``, ``"reset"``,
+        What the program reads besides setpoint, measurement, mode and the operator's output: ``"cascade"``, ``"track"``,
+        ``"reset"``,
         ``"feedforward"``.
     title : str
         The program's title.

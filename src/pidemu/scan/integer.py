@@ -29,7 +29,8 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
         dD = (Td (y1 - y) - h D + Dr) div (h + Tf)      Dr = ... mod (h + Tf)      D = D + dD
         M  = M + kp (dP + dI + dD)
 
-    ``kp`` is a whole number of ``1/gain_counts``, so that ``M`` counts in ``1/(counts gain_counts)`` percent and loses nothing; the output
+    ``kp`` is a whole number of ``1/gain_counts``, so that ``M`` counts in ``1/(counts gain_counts)`` percent and loses nothing;
+    the output
     is ``M`` in whole counts. Division rounds down.
 
     Raises

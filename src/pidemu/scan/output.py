@@ -1,4 +1,4 @@
-"""From the sum of the terms to the output: filter, feedforward, limits, rate limit, deadband, resolution, mode (sections 5 to 8)."""
+"""From the sum of the terms to the output: filter, feedforward, limits, rate limit, deadband, resolution, mode."""
 
 from __future__ import annotations
 

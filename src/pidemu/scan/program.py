@@ -192,8 +192,9 @@ class Program:
     title : str
         Which controller.
     inputs : tuple of Quantity
-        Signals read each scan, in order: ``sp, pv, auto, manual``, then those asked for. ``manual`` is NaN where the operator has set
-        nothing; so are ``cascade`` (remote setpoint), ``track`` (output to follow) and ``reset`` (external reset) where there is none.
+        Signals read each scan, in order: ``sp, pv, auto, manual``, then those asked for. ``manual`` is NaN where the operator has
+        set nothing; so are ``cascade`` (remote setpoint), ``track`` (output to follow) and ``reset`` (external reset) where there
+        is none.
     coefficients : tuple of Quantity
         Numbers fixed by settings and scan interval.
     values : tuple of float

@@ -93,7 +93,7 @@ def terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initi
 def _signals(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Signals:
     cascade = equal(Name("cascade"), Name("cascade")) & b.automatic if b.has("cascade") else None
     y = _measurement(b, a, h, fresh)
-    r = _setpoint(b, a, h, fresh, y, cascade)
+    r = _setpoint(b, a, h, fresh, cascade)
     e: Expr = b.let("e", r - y, "error")
     if a.e_filter is not None:
         e = blocks.signal_lag(b, e, fresh, a.e_filter, h, "e_in")
@@ -115,7 +115,7 @@ def _measurement(b: Builder, a: Algorithm, h: float, fresh: Expr) -> Expr:
     return y
 
 
-def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, y: Expr, cascade: Expr | None) -> Expr:
+def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, cascade: Expr | None) -> Expr:
     """Return the setpoint as the algorithm sees it: remote or local, tracking, rate limit, filter (sections 6 and 8)."""
     r: Expr = Name("sp")
     if a.sp_tracks:

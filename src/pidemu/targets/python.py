@@ -179,8 +179,8 @@ class Compiled:
     run : callable
         ``run(state, *signals) -> list of u``, with one sequence per input.
     run_automatic : callable
-        ``run_automatic(state, sp, pv, ...) -> list of u``: the same for scans after the first automatic one, without mode, operator's output
-        and output to follow.
+        ``run_automatic(state, sp, pv, ...) -> list of u``: the same for scans after the first automatic one, without mode,
+        operator's output and output to follow.
     initial : tuple of float
         The states before the first scan, in the program's precision.
     bind : callable
@@ -235,11 +235,12 @@ def compiled(program: Program, like: tuple[Program, Compiled] | None = None) -> 
     values, initial = program.values, program.initial
     if program.precision == "float32":
         values, initial = _narrow(values), _narrow(initial)
-    return Compiled(*bind(*values), initial, bind)
+    scan, run, run_automatic = bind(*values)
+    return Compiled(scan, run, run_automatic, initial, bind)
 
 
 def _narrow(values: Sequence[float]) -> tuple[float, ...]:
     import numpy as np
 
     with np.errstate(over="ignore"):
-        return tuple(np.float32(v) for v in values)
+        return tuple(np.float32(v) for v in values)  # type: ignore[misc]  # they stand in for floats
