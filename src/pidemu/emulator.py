@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite, isinf, isnan, nan
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -74,8 +74,8 @@ class Controller:
         Scan interval [s]; by default the card's.
     action : {"reverse", "direct"}
         Control action in the ISA sense: reverse means that the output falls when the measurement rises. The card's own words are in
-        ``settings.equation.action.names``. Where the card has no such choice (``settings.equation.action.fixed``), the sign of the gain
-        decides, and this argument does nothing.
+        ``settings.equation.action.names``. Where the card has no such choice (``settings.equation.action.fixed``), the sign of the
+        gain decides, and this argument does nothing.
     output_limits : tuple of float, optional
         Low and high output limit [% of span; engineering units for a card with ``signals: engineering``]; by default the card's.
     bias : float
@@ -149,6 +149,7 @@ class Controller:
         self._compiled: Compiled = compiled(self.program)
         self._scan = self._compiled.scan
         self._others: dict[float, Compiled] = {}
+        self._know_the_everyday_scan()
 
     def _program(self, h: float) -> Program:
         return build(
@@ -200,14 +201,15 @@ class Controller:
         self._state[:] = self._compiled.initial
         self._mode, self._count, self._last = "power-up", 0, ()
         self.events.clear()
+        self._know_the_everyday_scan()
 
     def start(self, **states: float) -> None:
         """Set what the program keeps from scan to scan, before the first scan.
 
-        Nothing else is touched: the other states stay where they are before the first scan, most at zero. The first scan is a transfer
-        from the output ``u``, which sets the integral anew. With ``I`` it is not: the controller goes on as if it had been running in
-        automatic, ``on`` and ``begun`` are 1 where the program has them, and what is kept of signals and filters should be given too.
-        All states of another controller, ``start(**other.state)``, let this one go on where that one is.
+        Nothing else is touched: the other states stay where they are before the first scan, most at zero. The first scan is a
+        transfer from the output ``u``, which sets the integral anew. With ``I`` it is not: the controller goes on as if it had been
+        running in automatic, ``on`` and ``begun`` are 1 where the program has them, and what is kept of signals and filters should
+        be given too. All states of another controller, ``start(**other.state)``, let this one go on where that one is.
 
         Parameters
         ----------
@@ -225,7 +227,7 @@ class Controller:
         for name, value in states.items():
             if name not in names:
                 raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
-            if not math.isfinite(value):
+            if not isfinite(value):
                 raise ScanError(f"the state {name} = {value} is not a finite number")
         running = [name for name in ("on", "begun") if "I" in states and name in names]
         for name, value in (dict.fromkeys(running, 1.0) | states).items():
@@ -235,8 +237,8 @@ class Controller:
     def change(self, settings: Settings | Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Change settings while running, as the real controller takes it (specs/equations.md, section 6).
 
-        The states stay. A gain that acts on what the integral holds bumps the output; a card with ``changes: bumpless`` sets the integral
-        so that it does not. Where the new settings bring terms that were off, these start at rest, from the last signals.
+        The states stay. A gain that acts on what the integral holds bumps the output; a card with ``changes: bumpless`` sets the
+        integral so that it does not. Where the new settings bring terms that were off, these start at rest, from the last signals.
 
         Parameters
         ----------
@@ -283,8 +285,8 @@ class Controller:
         fresh = list(self._compiled.initial)
         if self._last and any(q.name not in state for q in self.program.states):
             named = dict(zip((q.name for q in self.program.inputs), self._last, strict=False))
-            named |= {"auto": 0.0, "manual": state["u"], "track": math.nan}
-            self._compiled.scan(fresh, *(named.get(q.name, math.nan) for q in self.program.inputs))
+            named |= {"auto": 0.0, "manual": state["u"], "track": nan}
+            self._compiled.scan(fresh, *(named.get(q.name, nan) for q in self.program.inputs))
         self._state = [state.get(q.name, float(x)) for q, x in zip(self.program.states, fresh, strict=True)]
 
     def _keep_output(self, before: Program, state: Mapping[str, float]) -> None:
@@ -313,8 +315,8 @@ class Controller:
         Parameters
         ----------
         sp, pv : float
-            Setpoint and measurement [% of span; engineering units for a card with ``signals: engineering``]. What happens with NaN and
-            infinity is the card's (``faults.signal``); by default the output is held and `events` says so.
+            Setpoint and measurement [% of span; engineering units for a card with ``signals: engineering``]. What happens with NaN
+            and infinity is the card's (``faults.signal``); by default the output is held and `events` says so.
         auto : bool
             Automatic; otherwise manual.
         manual : float, optional
@@ -330,7 +332,8 @@ class Controller:
         hold : bool
             Nothing is computed and the output stands; the scan after it is a transfer.
         interval : float, optional
-            Time since the last scan [s]; by default the nominal one. It counts with cards that measure it (``scan.interval: measured``).
+            Time since the last scan [s]; by default the nominal one. It counts with cards that measure it (``scan.interval:
+            measured``).
 
         Returns
         -------
@@ -342,38 +345,56 @@ class Controller:
         ScanError
             The manual output is infinite, the card has no use for a signal, or it refuses the interval.
         """
-        given = {"cascade": cascade, "track": track, "external_reset": external_reset, "feedforward": feedforward}
-        extra = {name: float(x) for name, x in given.items() if x is not None}
-        if extra:
-            self._read(extra)
-        by_hand = math.nan if manual is None else manual
-        if math.isinf(by_hand):
-            raise ScanError(f"the manual output {manual} is not a finite number")
+        everyday = self._plain and auto is True and manual is None and interval is None and not hold
+        if everyday and cascade is track is external_reset is feedforward is None and isfinite(sp) and isfinite(pv):
+            self._last = (sp, pv, 1.0, nan)
+            self._count += 1
+            return self._scan(self._state, sp, pv, 1.0, nan)
+        signals = (cascade, track, external_reset, feedforward)
+        given = {name: float(x) for name, x in zip(_SIGNALS, signals, strict=True) if x is not None}
+        return self._any_scan(sp, pv, auto, nan if manual is None else manual, given, hold, interval)
+
+    def _any_scan(
+        self, sp: float, pv: float, auto: bool, by_hand: float, given: Mapping[str, float], hold: bool, interval: float | None
+    ) -> float:
+        """Do a scan that is not the everyday one: another mode, other signals, what is wrong with them."""
+        if given:
+            self._read(given)
+        if isinf(by_hand):
+            raise ScanError(f"the manual output {by_hand} is not a finite number")
+        inputs = (sp, pv, 1.0 if auto else 0.0, by_hand, *(given.get(s, _absent(s)) for s in self._names))
         mode: Mode = "automatic" if auto else "manual"
-        inputs: tuple[float, ...] = (sp, pv, 1.0 if auto else 0.0, by_hand)
-        if self._signals:
-            inputs += tuple(_absent(s) if s not in extra else extra[s] for s in self._names)
-            mode = "tracking" if not math.isnan(extra.get("track", math.nan)) else mode
-            mode = "cascade" if auto and mode == "automatic" and not math.isnan(extra.get("cascade", math.nan)) else mode
+        if auto and not isnan(given.get("cascade", nan)):
+            mode = "cascade"
+        if not isnan(given.get("track", nan)):
+            mode = "tracking"
         compiled = self._compiled
-        if hold or interval is not None or not (math.isfinite(sp) and math.isfinite(pv)):
+        if hold or interval is not None or not (isfinite(sp) and isfinite(pv)):
             found = self._odd(mode, inputs, hold, interval)
             if isinstance(found, float):
                 return found
             compiled = found
-        if mode is self._mode:
-            u = compiled.scan(self._state, *inputs)
-        else:
-            was = self.output
-            u = compiled.scan(self._state, *inputs)
-            self._transfer(self._count, mode, float(u) - was)
+        return self._scanned(compiled, mode, inputs)
+
+    def _scanned(self, compiled: Compiled, mode: Mode, inputs: tuple[float, ...]) -> float:
+        """Do one scan and note a change of mode."""
+        was = self.output
+        with self._quiet():
+            u = float(compiled.scan(self._state, *inputs))
+        if mode != self._mode:
+            self._transfer(self._count, mode, u - was)
         self._last = inputs
         self._count += 1
-        return float(u)
+        return u
 
     def _transfer(self, scan: int, mode: Mode, bump: float) -> None:
         self.events.append(Event(scan, "transfer", f"{self._mode} to {mode}", bump))
         self._mode = mode
+        self._know_the_everyday_scan()
+
+    def _know_the_everyday_scan(self) -> None:
+        """Keep in mind whether a scan without anything special goes straight to the program."""
+        self._plain = self._mode == "automatic" and not self._signals and self.program.precision == "float64"
 
     @property
     def _names(self) -> list[str]:
@@ -396,7 +417,7 @@ class Controller:
             if self._last:
                 old = dict(zip((q.name for q in self.program.inputs), self._last, strict=True))
                 self._use(self.settings)
-                self._last = tuple(old.get(q.name, 0.0 if q.name == "feedforward" else math.nan) for q in self.program.inputs)
+                self._last = tuple(old.get(q.name, 0.0 if q.name == "feedforward" else nan) for q in self.program.inputs)
             else:
                 self._use(self.settings)
             self._carry(state)
@@ -405,14 +426,14 @@ class Controller:
         """Deal with a hold, a bad signal or an uneven interval: return the output, or the program that computes it."""
         if hold:
             return self._stand("hold", inputs)
-        bad = not (math.isfinite(inputs[0]) and math.isfinite(inputs[1]))
+        bad = not (isfinite(inputs[0]) and isfinite(inputs[1]))
         policy = self._faults.signal
         if bad:
-            name, value = ("setpoint", inputs[0]) if not math.isfinite(inputs[0]) else ("measurement", inputs[1])
+            name, value = ("setpoint", inputs[0]) if not isfinite(inputs[0]) else ("measurement", inputs[1])
             done = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}[policy]
             self.events.append(Event(self._count, "signal", f"{name} is {value}: {done}"))
             if policy != "propagate":
-                instead = None if policy == "hold" or mode not in ("automatic", "cascade") else math.nan if policy == "nan" else 0.0
+                instead = None if policy == "hold" or mode not in ("automatic", "cascade") else nan if policy == "nan" else 0.0
                 return self._stand(mode, inputs, instead)
         if interval is None or self.settings.equation.scan.interval == "nominal":
             return self._compiled
@@ -429,7 +450,7 @@ class Controller:
             h = 0.0
         if h == 0 and faults.zero_interval == "compute":
             return 0.0
-        if h > 0 and math.isfinite(h):
+        if h > 0 and isfinite(h):
             return h
         self.events.append(Event(self._count, "interval", f"interval of {interval:g} s: nothing computed, output held"))
         return None
@@ -440,11 +461,11 @@ class Controller:
         at, was = names.index("u"), float(self._state[names.index("u")])
         u = was
         if mode in ("manual", "tracking", "hold"):
-            follow = inputs[4 + self._names.index("track")] if "track" in self._signals else math.nan
-            by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else math.nan
-            u = was if math.isnan(by_hand) else by_hand
+            follow = inputs[4 + self._names.index("track")] if "track" in self._signals else nan
+            by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else nan
+            u = was if isnan(by_hand) else by_hand
             if mode == "manual":
-                u = self._by_hand(u, moved=not math.isnan(by_hand))
+                u = self._by_hand(u, moved=not isnan(by_hand))
             self._state[at] = u
             if "on" in names:
                 self._state[names.index("on")] = 0.0
@@ -506,7 +527,7 @@ class Controller:
         extra = {name: x for name, x in given.items() if x is not None}
         if extra:
             self._read(extra)
-        columns = {"sp": sp, "pv": pv, "auto": True if auto is None else auto, "manual": math.nan if manual is None else manual}
+        columns = {"sp": sp, "pv": pv, "auto": True if auto is None else auto, "manual": nan if manual is None else manual}
         columns |= {s: extra.get(s, _absent(s)) for s in self._names}
         columns |= {"hold": False if hold is None else hold, "interval": self.interval if interval is None else interval}
         signals = dict(zip(columns, _broadcast(list(columns.values())), strict=True))
@@ -541,14 +562,7 @@ class Controller:
         found = self._odd(mode, inputs, hold, float(signals["interval"][i]) if measured else None)
         if isinstance(found, float):
             return found
-        was = self.output
-        with self._quiet():
-            u = float(found.scan(self._state, *inputs))
-        if mode != self._mode:
-            self._transfer(self._count, mode, u - was)
-        self._last = inputs
-        self._count += 1
-        return u
+        return self._scanned(found, mode, inputs)
 
     def _spell(self, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
@@ -580,7 +594,7 @@ def _value(name: str, program: Program, state: list[float], inputs: tuple[float,
 
 def _absent(signal: str) -> float:
     """Return what a signal is where there is none."""
-    return 0.0 if signal == "feedforward" else math.nan
+    return 0.0 if signal == "feedforward" else nan
 
 
 def _broadcast(columns: Sequence[npt.ArrayLike]) -> list[Floats]:

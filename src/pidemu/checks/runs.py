@@ -62,7 +62,7 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
     """Every combination of options compiles to a scan program, or says that it is not defined."""
     for variant in variants(card):
         try:
-            Controller(_plausible(variant)).scan(50.0, 49.0)
+            Controller(plausible(variant)).scan(50.0, 49.0)
         except UndefinedError:
             continue
         except PidemuError as error:
@@ -71,7 +71,7 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
             yield card.document.problem(("options",) if chosen else ("settings",), message)
 
 
-def _plausible(variant: Variant) -> Settings:
+def plausible(variant: Variant) -> Settings:
     """Return settings with every term of the variant at work."""
     values: dict[str, object] = dict(variant.chosen)
     for name, s in variant.equation.settings.items():

@@ -258,7 +258,7 @@ class Target:
         """
         equation = self.variant.equation
         idle = [n for n, s in self._without_default() if not is_computed(equation, n, Role(s.sets)) and n not in self.given]
-        missing = [n for n in idle if equation.settings[n].sets != Role.MULTIPLIER]
+        missing = [n for n in idle if equation.settings[n].sets != "multiplier"]
         if missing:
             raise SettingError(
                 f"{self.card.id}: a conversion does not compute {' and '.join(missing)}, and the card has no default; "
