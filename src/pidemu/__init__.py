@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
+    from pidemu.comparison import Comparison, compare
     from pidemu.conversion.convert import Conversion, convert
     from pidemu.emulator import Controller
     from pidemu.errors import (
@@ -31,6 +32,8 @@ _HOMES = {
     "cards": "card.library",
     "load_card": "card.library",
     "Card": "card.load",
+    "Comparison": "comparison",
+    "compare": "comparison",
     "Conversion": "conversion.convert",
     "convert": "conversion.convert",
     "Controller": "emulator",
@@ -48,6 +51,7 @@ _HOMES = {
 __all__ = [
     "Card",
     "CardError",
+    "Comparison",
     "Controller",
     "Conversion",
     "ConversionRefusedError",
@@ -60,6 +64,7 @@ __all__ = [
     "UnitError",
     "__version__",
     "cards",
+    "compare",
     "convert",
     "load_card",
 ]

@@ -1,13 +1,13 @@
-"""Recorded signals: CSV files with setpoint, measurement, and perhaps mode, operator's output and recorded output."""
+"""Recorded signals: CSV files with setpoint, measurement, and perhaps mode, operator's output, recorded output and more."""
 
 from __future__ import annotations
 
 import csv
 import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -25,9 +25,16 @@ _COLUMNS: Final = {
     "auto": ("auto", "automatic"),
     "manual": ("manual", "man"),
     "output": ("output", "out", "op", "cv", "u"),
+    "cascade": ("cascade", "cas", "remote_sp", "rsp", "remote_setpoint"),
+    "track": ("track", "tracking"),
+    "external_reset": ("external_reset", "reset_signal", "ext_reset"),
+    "feedforward": ("feedforward", "ff"),
+    "hold": ("hold",),
+    "interval": ("interval", "dt"),
 }
-_UNEVEN: Final = 0.01
-"""Relative jitter of a time column that counts as none."""
+_MAY_BE_EMPTY: Final = ("manual", "output", "cascade", "track", "external_reset", "feedforward", "interval")
+SIGNALS: Final = ("cascade", "track", "external_reset", "feedforward", "hold")
+"""Columns that go to the controller as they are, under the names of its arguments."""
 _TRUE: Final = {"1", "1.0", "true", "yes", "auto", "automatic", "a"}
 _FALSE: Final = {"0", "0.0", "false", "no", "man", "manual", "m"}
 
@@ -38,33 +45,63 @@ class Record:
 
     Attributes
     ----------
+    sp, pv : ndarray of float, shape (n,)
+        Setpoint and measurement; NaN and infinity where the file says so.
+    time : ndarray of float, shape (n,), or None
+        Time of the samples [s]; of timestamps, since the first one.
+    auto, manual, output : ndarray of float, shape (n,), or None
+        Automatic (1) or manual (0); the operator's output, NaN where empty; the recorded output, NaN where empty.
+    cascade, track, external_reset, feedforward : ndarray of float, shape (n,), or None
+        Remote setpoint, output to follow, external reset and feedforward; NaN where empty: no signal.
+    hold : ndarray of float, shape (n,), or None
+        Whether the controller stands still (1).
+    interval : ndarray of float, shape (n,), or None
+        Time since the last scan [s], NaN where empty: nominal.
     header : tuple of str
         Column names of the file.
     rows : tuple of tuple of str
         Its cells, as they stand.
-    sp, pv : ndarray of float, shape (n,)
-        Setpoint and measurement.
-    time : ndarray of float, shape (n,), or None
-        Time of the samples [s].
-    auto, manual, output : ndarray of float, shape (n,), or None
-        Automatic (1) or manual (0); the operator's output, NaN where empty; the recorded output, NaN where empty.
+    names : mapping
+        The file's own name of a column, by the names above.
     """
 
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
     sp: Floats
     pv: Floats
-    time: Floats | None
-    auto: Floats | None
-    manual: Floats | None
-    output: Floats | None
+    time: Floats | None = None
+    auto: Floats | None = None
+    manual: Floats | None = None
+    output: Floats | None = None
+    cascade: Floats | None = None
+    track: Floats | None = None
+    external_reset: Floats | None = None
+    feedforward: Floats | None = None
+    hold: Floats | None = None
+    interval: Floats | None = None
+    header: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def signals(self) -> dict[str, Floats]:
+        """The signals beyond setpoint, measurement, mode and operator's output, by the name of the controller's argument.
+
+        A column that is empty throughout is no signal.
+        """
+        found = {name: getattr(self, name) for name in SIGNALS}
+        return {name: x for name, x in found.items() if x is not None and not np.isnan(x).all()}
+
+    @property
+    def by_hand(self) -> Floats | None:
+        """What is taken for the operator's output: the column of that name, else the recorded output."""
+        return self.output if self.manual is None else self.manual
 
 
 def read_record(path: str | Path) -> Record:
     """Read a CSV file with a header line; lines that start with ``#`` are comments.
 
-    Columns are found by name: ``sp``, ``pv``, ``time`` (or ``t``: seconds or timestamps), ``auto``, ``manual`` (or ``man``),
-    ``output`` (or ``out``, ``op``); others are kept and ignored.
+    Columns are found by name, in any case: ``sp``, ``pv``, ``time`` (or ``t``: seconds or timestamps), ``auto``, ``manual`` (or
+    ``man``), ``output`` (or ``out``, ``op``), ``cascade`` (or ``cas``, ``rsp``), ``track``, ``external_reset``, ``feedforward`` (or
+    ``ff``), ``hold``, ``interval`` (or ``dt``); others are kept and ignored.
 
     Parameters
     ----------
@@ -92,116 +129,104 @@ def read_record(path: str | Path) -> Record:
     for i, row in table[1:]:
         if len(row) != len(header):
             raise RecordError(f"{path}:{i}: {len(row)} cells, the header has {len(header)}")
-    columns: dict[str, Floats | None] = {
-        name: np.array([_cell(str(path), i, row[at], header[at], name) for i, row in table[1:]]) if at is not None else None
-        for name, at in places.items()
-    }
-    sp, pv = columns["sp"], columns["pv"]
-    assert sp is not None
-    assert pv is not None
+    columns: dict[str, Floats] = {}
+    for name, at in places.items():
+        cells = [(f"{path}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
+        columns[name] = _times(cells) if name == "time" else np.array([_cell(*cell, name) for cell in cells])
     rows = tuple(tuple(row) for _, row in table[1:])
-    return Record(tuple(header), rows, sp, pv, columns["time"], columns["auto"], columns["manual"], columns["output"])
+    return Record(header=tuple(header), rows=rows, names={name: header[at] for name, at in places.items()}, **columns)
 
 
-def _places(path: str, line: int, header: list[str]) -> dict[str, int | None]:
-    places: dict[str, int | None] = {}
+def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
+    places: dict[str, int] = {}
     for name, words in _COLUMNS.items():
         hits = [i for i, cell in enumerate(header) if cell.casefold() in words]
         if len(hits) > 1:
             raise RecordError(f"{path}:{line}: columns {', '.join(header[i] for i in hits)} all mean {name}; keep one")
-        places[name] = hits[0] if hits else None
+        if hits:
+            places[name] = hits[0]
     for name in ("sp", "pv"):
-        if places[name] is None:
+        if name not in places:
             split = "; the cells are separated by semicolons, save the file with commas" if ";" in "".join(header) else ""
             raise RecordError(f"{path}:{line}: no column '{name}' among {', '.join(header)}{suggest(name, header)}{split}")
     return places
 
 
-def _cell(path: str, line: int, text: str, column: str, name: str) -> float:
-    word = text.strip().casefold()
-    if name == "auto":
-        if word in _TRUE or word in _FALSE:
-            return float(word in _TRUE)
-        raise RecordError(f"{path}:{line}: column {column}: '{text}' is neither 1 (automatic) nor 0 (manual)")
-    if not word and name in ("manual", "output"):
+def _cell(where: str, text: str, name: str) -> float:
+    word = text.casefold()
+    if name in ("auto", "hold"):
+        return _yes_or_no(where, text, name)
+    if not word and name in _MAY_BE_EMPTY:
         return math.nan
-    if name == "time":
-        return _time(path, line, column, text.strip())
     if not word:
-        raise RecordError(f"{path}:{line}: column {column}: empty; every sample needs a number")
+        raise RecordError(f"{where}: empty; every sample needs a number")
     try:
         value = float(word)
     except ValueError:
         if re.fullmatch(r"[+-]?\d+,\d+", word):
-            raise RecordError(f"{path}:{line}: column {column}: '{text}' has a comma; write a decimal point") from None
-        raise RecordError(f"{path}:{line}: column {column}: '{text}' is not a number") from None
-    if not math.isfinite(value) and name in ("sp", "pv"):
-        raise RecordError(f"{path}:{line}: column {column}: '{text}' is not a finite number")
+            raise RecordError(f"{where}: '{text}' has a comma; write a decimal point") from None
+        raise RecordError(f"{where}: '{text}' is not a number") from None
+    if name == "interval" and math.isnan(value):
+        raise RecordError(f"{where}: '{text}' is no interval; leave the cell empty for the nominal one")
+    if name in SIGNALS and math.isinf(value):
+        raise RecordError(f"{where}: '{text}' is not a finite number; leave the cell empty where there is no signal")
     return value
 
 
-def _time(path: str, line: int, column: str, text: str) -> float:
-    """Return seconds: the cell is a number of them, or a timestamp such as 2026-11-22T08:00:05."""
+def _yes_or_no(where: str, text: str, name: str) -> float:
+    word = text.casefold()
+    if name == "hold" and not word:
+        return 0.0
+    if word in _TRUE or word in _FALSE:
+        return float(word in _TRUE)
+    meaning = ("automatic", "manual") if name == "auto" else ("hold", "no hold")
+    raise RecordError(f"{where}: '{text}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
+
+
+def _times(cells: Iterable[tuple[str, str]]) -> Floats:
+    """Return seconds: the cells are numbers of them, or timestamps such as 2026-11-22T08:00:05, then since the first one."""
+    found = [(where, text, _time(where, text)) for where, text in cells]
+    first = found[0][2]
+    out = []
+    for where, text, x in found:
+        if isinstance(x, datetime) and isinstance(first, datetime):
+            out.append((x - first).total_seconds())
+        elif isinstance(x, datetime) or isinstance(first, datetime):
+            raise RecordError(f"{where}: '{text}' is not like the cells above; write seconds or timestamps throughout")
+        else:
+            out.append(x)
+    return np.array(out)
+
+
+def _time(where: str, text: str) -> float | datetime:
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
         pass
+    else:
+        if math.isfinite(value):
+            return value
     try:
-        return datetime.fromisoformat(text).timestamp()
+        stamp = datetime.fromisoformat(text)
     except ValueError:
         wanted = "a number of seconds nor a timestamp such as 2026-11-22T08:00:05"
-        raise RecordError(f"{path}:{line}: column {column}: '{text}' is neither {wanted}") from None
+        raise RecordError(f"{where}: '{text}' is neither {wanted}") from None
+    return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)  # a clock change is no gap
 
 
-def interval(record: Record, path: str | Path, given: float | None) -> float | None:
-    """Return the scan interval of a record [s]: the given one, else that of its time column, else ``None``.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    path : path
-        Its file, for messages.
-    given : float or None
-        What the user says [s].
-
-    Raises
-    ------
-    RecordError
-        The time column is uneven, or contradicts `given`.
-    """
-    if record.time is None or record.time.size < 2:
-        return given
-    steps = np.diff(record.time)
-    step = float(np.median(steps))
-    uneven = int(np.argmax(np.abs(steps - step)))
-    if not step > 0 or abs(steps[uneven] - step) > _UNEVEN * step:
-        raise RecordError(
-            f"{path}: the time column goes on by {steps[uneven]:g} s after sample {uneven} (counted from 0), elsewhere by "
-            f"{step:g} s; one line per scan is needed"
-        )
-    if given is not None and abs(given - step) > _UNEVEN * step:
-        raise RecordError(
-            f"{path}: the time column has a step of {step:g} s, --scan says {given:g} s; leave --scan out, or the column"
-        )
-    return step if given is None else given
-
-
-def write_record(record: Record, column: str, values: Iterable[float], stream: TextIO) -> None:
-    """Write a record with one more column.
+def write_record(record: Record, columns: Mapping[str, Iterable[float]], stream: TextIO) -> None:
+    """Write a record with more columns.
 
     Parameters
     ----------
     record : Record
-        The record.
-    column : str
-        Name of the new column.
-    values : iterable of float
-        Its values, written so that they read back the same.
+        The record, with its header and rows.
+    columns : mapping
+        Values of the new columns by name, written so that they read back the same.
     stream : text stream
         Where to.
     """
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*record.header, column])
-    for row, value in zip(record.rows, values, strict=True):
-        writer.writerow([*row, repr(float(value))])
+    writer.writerow([*record.header, *columns])
+    for row, *values in zip(record.rows, *columns.values(), strict=True):
+        writer.writerow([*row, *(repr(float(value)) for value in values)])

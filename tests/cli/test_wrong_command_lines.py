@@ -168,7 +168,6 @@ RECORDS = {
     "sp,pv\n1,2\n\n1,high\n": "column pv: 'high' is not a number",
     'sp,pv\n"2,5",2\n': "column sp: '2,5' has a comma; write a decimal point",
     "sp,pv\n1,\n": "column pv: empty; every sample needs a number",
-    "sp,PV\n1,nan\n": "column PV: 'nan' is not a finite number",
     "sp,pv,auto\n1,2,cascade\n": "column auto: 'cascade' is neither 1 (automatic) nor 0 (manual)",
     "sp,pv,man\n1,2,x\n": "column man: 'x' is not a number",
     "sp,pv\n1,2\n1\n": "1 cells, the header has 2",

@@ -16,6 +16,7 @@ _COMMANDS: Final = {
     "check": "Check cards, the built-in ones or those given.",
     "convert": "Convert settings to another card, with a certificate.",
     "run": "Run a card on recorded signals.",
+    "compare": "Run cards on the same signals and compare their outputs.",
     "code": "Print the scan program of a card with its settings.",
 }
 

@@ -125,7 +125,9 @@ def _width(text: str) -> int:
     return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int = 2, right: Sequence[int] = ()) -> None:
+def table(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int = 2, right: Sequence[int] = (), err: bool = False
+) -> None:
     """Print a table: aligned plain text when piped, a rich table on a terminal.
 
     Parameters
@@ -138,9 +140,11 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int 
         Spaces to the left.
     right : sequence of int
         Columns that hold numbers, aligned to the right.
+    err : bool
+        Print on stderr.
     """
-    if sys.stdout.isatty():
-        _rich(columns, rows, indent, right)
+    if (sys.stderr if err else sys.stdout).isatty():
+        _rich(columns, rows, indent, right, err)
         return
     lines = [list(columns), *([list(r) for r in rows])] if any(columns) else [list(r) for r in rows]
     widths = [max((_width(line[i]) for line in lines), default=0) for i in range(len(columns))]
@@ -149,7 +153,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, indent: int 
         for i, cell in enumerate(line):
             pad = " " * (widths[i] - _width(cell))
             cells.append(pad + cell if i in right else cell + pad)
-        click.echo((" " * indent + "  ".join(cells)).rstrip())
+        click.echo((" " * indent + "  ".join(cells)).rstrip(), err=err)
 
 
 def wrapped(text: str, indent: str = "  ") -> None:
@@ -159,7 +163,7 @@ def wrapped(text: str, indent: str = "  ") -> None:
     click.echo(textwrap.fill(text, width, initial_indent=indent, subsequent_indent=rest, break_long_words=False))
 
 
-def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, right: Sequence[int]) -> None:
+def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, right: Sequence[int], err: bool) -> None:
     from rich.console import Console
     from rich.padding import Padding
     from rich.table import Table
@@ -170,7 +174,7 @@ def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, ri
         grid.add_column(Text(column), justify="right" if i in right else "left", overflow="fold")
     for row in rows:
         grid.add_row(*(Text(cell, style=_style(cell)) for cell in row))
-    Console().print(Padding(grid, (0, 0, 0, indent)))
+    Console(stderr=err).print(Padding(grid, (0, 0, 0, indent)))
 
 
 def _style(cell: str) -> str:

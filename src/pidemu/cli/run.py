@@ -5,15 +5,21 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 
 from pidemu.card.library import load_card
-from pidemu.cli.common import action_option, assignments, limits_option, number, vendors_option
+from pidemu.cli.common import action_option, assignments, json_option, limits_option, number, print_json, vendors_option
+from pidemu.cli.happened import tell
 from pidemu.emulator import Controller, Floats
-from pidemu.errors import RecordError, ScanError
-from pidemu.records import Record, interval, read_record, write_record
+from pidemu.errors import RecordError, SettingError, suggest
+from pidemu.plain import json_safe
+from pidemu.playback import Playback, Timing, play, timing
+from pidemu.records import Record, read_record, write_record
+from pidemu.scan.build import Action
+from pidemu.side_by_side import plain_settings
 
 
 @click.command("run", short_help="Run a card on recorded signals.")
@@ -24,7 +30,8 @@ from pidemu.records import Record, interval, read_record, write_record
     "file",
     required=True,
     metavar="FILE.csv",
-    help="Recorded signals: columns sp, pv and, if there are, auto, manual, output.",
+    help="Recorded signals: columns sp, pv and, if there are, time, auto, manual, output, cascade, track, external_reset, "
+    "feedforward, hold, interval.",
 )
 @click.option("--scan", type=float, metavar="H", help="Scan interval of record and controller [s]; by default the card's.")
 @action_option
@@ -37,13 +44,21 @@ from pidemu.records import Record, interval, read_record, write_record
     help="Output before the first scan; by default the first recorded one, else 0.",
 )
 @click.option(
+    "--initial",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="What the controller holds before the first scan, by the names that 'pidemu code' shows, such as I=30. Repeatable.",
+)
+@click.option(
     "-o",
     "--output",
     "target",
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
+@click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib.")
 @vendors_option
+@json_option
 def command(
     card: str,
     values: tuple[str, ...],
@@ -53,51 +68,129 @@ def command(
     limits: tuple[float, float] | None,
     bias: float,
     initial_output: float | None,
+    initial: tuple[str, ...],
     target: str | None,
+    picture: str | None,
     vendors: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     """Run CARD with the settings NAME=VALUE on a record, one scan per line, and write the record with the column 'emulated'.
 
-    Where the file has a recorded output, the largest difference is stated. Without --scan the interval is that of a time column.
+    Then it is said what happened: transfers and their bumps, spells at a limit, and, where the file has a recorded output, the
+    largest difference from it. Without --scan the interval is that of a time column; a card that measures the interval follows an
+    uneven one.
     """
+    if picture is not None:
+        from pidemu.plots import check_picture
+
+        check_picture(picture)
     settings = load_card(card, vendors).settings(assignments(values))
     record = read_record(file)
-    step = interval(record, file, scan)
+    when = timing(record, file, scan, settings)
     start = _initial(record) if initial_output is None else initial_output
-    controller = Controller(settings, step, "direct" if action == "direct" else "reverse", limits, bias=bias, initial_output=start)
-    manual = record.output if record.manual is None else record.manual
-    try:
-        emulated = controller.run(record.sp, record.pv, record.auto, manual)
-    except ScanError as error:
-        raise RecordError(f"{file}: {error}") from None
-    _write(record, emulated, target)
-    for note in (*settings.notes, *_notes(record, controller, step, bias, limits or settings.equation.output.limits)):
+    kind: Action = "direct" if action == "direct" else "reverse"
+    controller = Controller(settings, when.scan, kind, limits, bias=bias, initial_output=start)
+    left = _start(controller, initial, initial_output is not None)
+    playback = play(controller, record, file, when.interval)
+    emulated = playback.outputs
+    if target is not None or not as_json:
+        _write(record, emulated, target)
+    if as_json:
+        print_json(_plain(controller, record, playback))
+    bounds = limits or settings.equation.output.limits
+    for note in (*settings.notes, *_notes(record, controller, when, bias, bounds, kind), *left):
         click.echo(f"note: {note}", err=True)
-    click.echo(f"{len(emulated)} scans of {number(controller.interval)} s, {action} acting", err=True)
+    uneven = "" if when.interval is None else ", as the intervals were recorded"
+    click.echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
+    if not as_json:
+        tell(playback)
     if record.output is not None:
         click.echo(_difference(record, emulated), err=True)
+    if picture is not None:
+        from pidemu.plots import plot_run
+
+        plot_run(picture, settings, record, playback, bounds)
+
+
+def _start(controller: Controller, words: tuple[str, ...], has_output: bool) -> list[str]:
+    """Set the initial states that are given, and return what is to be noted of the others."""
+    given = assignments(words, "NAME=VALUE after --initial", "I=30")
+    known = controller.state
+    states: dict[str, float] = {}
+    for word, text in given.items():
+        name = "u" if word == "output" else word
+        if name not in known:
+            names = [*known, "output"]
+            raise SettingError(f"--initial {word}: no such state{suggest(word, names)}; states: {', '.join(names)}")
+        if name in states or (name == "u" and has_output):
+            raise SettingError("the output before the first scan is given twice; give it once")
+        states[name] = _number(word, str(text))
+    if states:
+        controller.start(**states)
+    others = [n for n, x in controller.state.items() if n not in states and n not in ("u", "on", "begun") and x == 0]
+    if "I" in states and others:
+        return [f"with I given the controller goes on as if it had been running; what else it holds is 0: {', '.join(others)}"]
+    return []
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise SettingError(f"--initial {name}: '{text}' is not a number") from None
+    if not np.isfinite(value):
+        raise SettingError(f"--initial {name}: '{text}' is not a finite number")
+    return value
+
+
+def _plain(controller: Controller, record: Record, playback: Playback) -> dict[str, Any]:
+    """Return everything as plain values."""
+    found = None if record.output is None else _worst(record.output, playback.outputs)
+    difference = None
+    if record.output is not None and found is not None:
+        largest, at, rms = found
+        pair = {"emulated": float(playback.outputs[at]), "recorded": float(record.output[at])}
+        difference = {"largest": largest, "scan": at, **pair, "rms": rms}
+    plain = {
+        **plain_settings(controller.settings),
+        "scan": controller.interval,
+        "outputs": playback.outputs.tolist(),
+        **playback.to_dict(),
+        "difference": difference,
+    }
+    safe: dict[str, Any] = json_safe(plain)
+    return safe
 
 
 def _write(record: Record, emulated: Floats, target: str | None) -> None:
     if target is None:
-        write_record(record, "emulated", emulated, sys.stdout)
+        write_record(record, {"emulated": emulated}, sys.stdout)
         return
     try:
         with Path(target).open("w", encoding="utf-8", newline="") as stream:
-            write_record(record, "emulated", emulated, stream)
+            write_record(record, {"emulated": emulated}, stream)
     except OSError as error:
         raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
 
 
-def _notes(record: Record, controller: Controller, step: float | None, bias: float, limits: tuple[float, float]) -> Iterator[str]:
+def _notes(
+    record: Record, controller: Controller, when: Timing, bias: float, limits: tuple[float, float], action: Action
+) -> Iterator[str]:
     """Yield what was taken for granted."""
-    if step is None:
+    if when.scan is None:
         default = f"{number(controller.interval)} s"
         yield f"the scan interval is the card's default, {default}: the record has no time column, and --scan is not given"
+    for name in ("cascade", "track"):
+        signal = record.signals.get(name)
+        if signal is not None and set(signal[~np.isnan(signal)].tolist()) <= {0.0, 1.0}:
+            what = "the remote setpoint" if name == "cascade" else "the output to follow"
+            yield f"column {record.names[name]} holds 0 and 1 only; it is taken for {what}, not for a mode"
+    if action == "direct" and controller.settings.equation.action.fixed:
+        yield f"{controller.settings.card.id} has no choice of action: the sign of the gain decides"
     by_hand = np.zeros(record.sp.size, dtype=bool) if record.auto is None else record.auto == 0
-    manual = record.output if record.manual is None else record.manual
-    if record.manual is None and by_hand.any() and manual is not None:
+    if record.manual is None and by_hand.any() and record.output is not None:
         yield "in manual the recorded output is taken for the operator's: the record has no column 'manual'"
+    manual = record.by_hand
     if manual is not None:
         outside = int(np.count_nonzero(by_hand & ((manual < limits[0]) | (manual > limits[1]))))
         if outside:
@@ -114,13 +207,22 @@ def _initial(record: Record) -> float:
     return 0.0
 
 
+def _worst(recorded: Floats, emulated: Floats) -> tuple[float, int, float] | None:
+    """Return the largest difference, where it is, and the root mean square; ``None`` where nothing is recorded."""
+    difference = np.abs(emulated - recorded)
+    if np.all(np.isnan(difference)):
+        return None
+    at = int(np.nanargmax(difference))
+    return float(difference[at]), at, float(np.sqrt(np.nanmean(difference**2)))
+
+
 def _difference(record: Record, emulated: Floats) -> str:
     assert record.output is not None
-    difference = np.abs(emulated - record.output)
-    if np.all(np.isnan(difference)):
+    found = _worst(record.output, emulated)
+    if found is None:
         return "the recorded output is empty throughout"
-    worst = int(np.nanargmax(difference))
+    largest, at, _ = found
     return (
-        f"largest difference from the recorded output: {difference[worst]:.6g} in sample {worst} (counted from 0): "
-        f"emulated {emulated[worst]:.8g}, recorded {record.output[worst]:.8g}"
+        f"largest difference from the recorded output: {largest:.6g} in sample {at} (counted from 0): "
+        f"emulated {emulated[at]:.8g}, recorded {record.output[at]:.8g}"
     )

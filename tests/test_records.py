@@ -1,0 +1,122 @@
+"""Recorded signals: what the columns mean, and what is refused."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pidemu.errors import RecordError
+from pidemu.records import Record, read_record, write_record
+
+NAN = float("nan")
+
+
+def read(folder: Path, text: str) -> Record:
+    (folder / "record.csv").write_text(text, encoding="utf-8")
+    return read_record(folder / "record.csv")
+
+
+def values(x: object) -> list[float]:
+    assert isinstance(x, np.ndarray)
+    found: list[float] = x.tolist()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("header", "name"),
+    [
+        ("cascade", "cascade"),
+        ("Cas", "cascade"),
+        ("REMOTE_SP", "cascade"),
+        ("rsp", "cascade"),
+        ("Track", "track"),
+        ("tracking", "track"),
+        ("external_reset", "external_reset"),
+        ("Reset_Signal", "external_reset"),
+        ("ext_reset", "external_reset"),
+        ("feedforward", "feedforward"),
+        ("FF", "feedforward"),
+    ],
+)
+def test_signals_are_found_by_any_of_their_names_and_empty_cells_are_none(tmp_path: Path, header: str, name: str) -> None:
+    record = read(tmp_path, f"sp,pv,{header}\n1,2,\n1,2,3.5\n1,2,nan\n")
+    np.testing.assert_array_equal(getattr(record, name), [NAN, 3.5, NAN])
+    assert list(record.signals) == [name]
+    assert record.names == {"sp": "sp", "pv": "pv", name: header}
+
+
+def test_a_signal_that_is_empty_throughout_is_none(tmp_path: Path) -> None:
+    assert read(tmp_path, "sp,pv,cas,ff\n1,2,,\n1,2,,\n").signals == {}
+
+
+def test_hold_is_a_yes_or_no_and_empty_is_no(tmp_path: Path) -> None:
+    record = read(tmp_path, "sp,pv,hold\n" + "".join(f"1,2,{word}\n" for word in ("1", "0", "", "yes", "False")))
+    assert values(record.hold) == [1, 0, 0, 1, 0]
+
+
+@pytest.mark.parametrize("header", ["interval", "dt", "DT"])
+def test_an_interval_may_be_empty_zero_negative_or_infinite(tmp_path: Path, header: str) -> None:
+    record = read(tmp_path, f"{header},sp,pv\n,1,2\n0.5,1,2\n0,1,2\n-1,1,2\ninf,1,2\n")
+    np.testing.assert_array_equal(record.interval, [NAN, 0.5, 0, -1, np.inf])
+
+
+def test_setpoint_and_measurement_may_be_no_numbers(tmp_path: Path) -> None:
+    record = read(tmp_path, "sp,pv\nnan,1\nNaN,-inf\nInf,infinity\n")
+    np.testing.assert_array_equal(record.sp, [NAN, NAN, np.inf])
+    np.testing.assert_array_equal(record.pv, [1, -np.inf, np.inf])
+
+
+def test_timestamps_count_from_the_first_one_and_across_a_change_of_clocks(tmp_path: Path) -> None:
+    stamps = ("2026-03-29T01:59:58.5", "2026-03-29T02:00:00", "2026-03-29 03:00:00")
+    assert values(read(tmp_path, "t,sp,pv\n" + "".join(f"{s},1,2\n" for s in stamps)).time) == [0, 1.5, 3601.5]
+    zones = ("2026-03-29T01:00:00+01:00", "2026-03-29T00:00:01+00:00")
+    assert values(read(tmp_path, "t,sp,pv\n" + "".join(f"{s},1,2\n" for s in zones)).time) == [0, 1]
+
+
+def test_seconds_are_kept_as_they_stand(tmp_path: Path) -> None:
+    assert values(read(tmp_path, "time,sp,pv\n100.5,1,2\n101,1,2\n").time) == [100.5, 101]
+
+
+def test_without_a_column_the_recorded_output_is_the_operator_s(tmp_path: Path) -> None:
+    record = read(tmp_path, "sp,pv,out\n1,2,3\n")
+    assert record.by_hand is record.output
+    record = read(tmp_path, "sp,pv,out,man\n1,2,3,4\n")
+    assert values(record.by_hand) == [4]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sp,pv\n1,2\n1,\n", ":3: column pv: empty; every sample needs a number"),
+        ("sp,pv\n,2\n", ":2: column sp: empty; every sample needs a number"),
+        ("sp,pv\nbad,2\n", ":2: column sp: 'bad' is not a number"),
+        ("sp,pv,FF\n1,2,inf\n", ":2: column FF: 'inf' is not a finite number; leave the cell empty where there is no signal"),
+        ("sp,pv,cas\n1,2,on\n", ":2: column cas: 'on' is not a number"),
+        ("sp,pv,hold\n1,2,maybe\n", ":2: column hold: 'maybe' is neither 1 (hold) nor 0 (no hold)"),
+        ("sp,pv,auto\n1,2,\n", ":2: column auto: '' is neither 1 (automatic) nor 0 (manual)"),
+        ("sp,pv,dt\n1,2,nan\n", ":2: column dt: 'nan' is no interval; leave the cell empty for the nominal one"),
+        ("sp,pv,cas,RSP\n1,2,3,4\n", ":1: columns cas, RSP all mean cascade; keep one"),
+        (
+            "t,sp,pv\n0,1,2\n2026-01-01,1,2\n",
+            ":3: column t: '2026-01-01' is not like the cells above; write seconds or timestamps throughout",
+        ),
+        (
+            "t,sp,pv\nnan,1,2\n",
+            ":2: column t: 'nan' is neither a number of seconds nor a timestamp such as 2026-11-22T08:00:05",
+        ),
+    ],
+)
+def test_a_cell_that_cannot_be_used_is_refused_at_its_place(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(RecordError) as caught:
+        read(tmp_path, text)
+    assert str(caught.value) == f"{tmp_path / 'record.csv'}{message}"
+
+
+def test_new_columns_are_written_behind_the_cells_as_they_stand(tmp_path: Path) -> None:
+    record = read(tmp_path, 'sp,pv,note\n1.50,2,"a, b"\n1,2,\n')
+    stream = io.StringIO()
+    write_record(record, {"x": [0.1, 1 / 3], "y": [1, np.float64(2)]}, stream)
+    assert stream.getvalue() == f'sp,pv,note,x,y\n1.50,2,"a, b",0.1,1.0\n1,2,,{1 / 3!r},2.0\n'
