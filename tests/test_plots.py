@@ -13,9 +13,9 @@ import pytest
 import pidemu
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
-from pidemu.playback import play
 from pidemu.plots import check_picture, plot_comparison, plot_run
-from pidemu.records import Record
+from pidemu.record.files import Record
+from pidemu.record.playback import play
 from tests.cli.helpers import Said, said
 
 ROOT = Path(__file__).parents[1]

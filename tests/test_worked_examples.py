@@ -24,7 +24,7 @@ from pidemu.card.source import Document, parse, parse_file
 from pidemu.cli import cli
 from pidemu.conversion.loopfile import read_loop
 from pidemu.errors import CardError, Problem
-from pidemu.records import read_record
+from pidemu.record.files import read_record
 from pidemu.settings import Settings
 
 ROOT = Path(__file__).parents[1]

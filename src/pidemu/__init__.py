@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
-    from pidemu.comparison import Comparison, compare
+    from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import Conversion, convert
     from pidemu.emulator import Controller
     from pidemu.errors import (
@@ -32,8 +32,8 @@ _HOMES = {
     "cards": "card.library",
     "load_card": "card.library",
     "Card": "card.load",
-    "Comparison": "comparison",
-    "compare": "comparison",
+    "Comparison": "comparison.compare",
+    "compare": "comparison.compare",
     "Conversion": "conversion.convert",
     "convert": "conversion.convert",
     "Controller": "emulator",

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pidemu.comparison import Comparison
+from pidemu.comparison.compare import Comparison
+from pidemu.comparison.side_by_side import dials
 from pidemu.errors import PidemuError
-from pidemu.playback import Playback, modes, spells
-from pidemu.records import Floats, Record
+from pidemu.record.files import Floats, Record
+from pidemu.record.playback import Playback, modes, spells
+from pidemu.record.standard import StandardRecord
 from pidemu.settings import Settings
-from pidemu.side_by_side import dials
-from pidemu.standard import StandardRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

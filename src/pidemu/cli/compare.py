@@ -21,12 +21,12 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.happened import moved
-from pidemu.comparison import Comparison, compare
+from pidemu.comparison.compare import Comparison, compare
+from pidemu.comparison.side_by_side import dials
 from pidemu.errors import RecordError
-from pidemu.playback import NO_BUMP
-from pidemu.records import SIGNALS, Record, write_record
-from pidemu.side_by_side import dials
-from pidemu.standard import StandardRecord
+from pidemu.record.files import SIGNALS, Record, write_record
+from pidemu.record.playback import NO_BUMP
+from pidemu.record.standard import StandardRecord
 
 if TYPE_CHECKING:
     _ScansType = click.ParamType[tuple[float, ...]]

@@ -9,7 +9,7 @@ import click
 
 from pidemu.cli.common import number, table
 from pidemu.emulator import Event
-from pidemu.playback import NO_BUMP, Playback
+from pidemu.record.playback import NO_BUMP, Playback
 
 _ROWS: Final = 12
 """Rows after which it is said how many more there are."""

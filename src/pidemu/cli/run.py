@@ -13,13 +13,13 @@ import numpy as np
 from pidemu.card.library import load_card
 from pidemu.cli.common import action_option, assignments, json_option, limits_option, number, print_json, vendors_option
 from pidemu.cli.happened import tell
+from pidemu.comparison.side_by_side import plain_settings
 from pidemu.emulator import Controller, Floats
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.plain import json_safe
-from pidemu.playback import Playback, Timing, play, timing
-from pidemu.records import Record, read_record, write_record
+from pidemu.record.files import Record, read_record, write_record
+from pidemu.record.playback import Playback, Timing, play, timing
 from pidemu.scan.build import Action
-from pidemu.side_by_side import plain_settings
 
 
 @click.command("run", short_help="Run a card on recorded signals.")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pidemu.errors import RecordError
-from pidemu.records import Record, read_record, write_record
+from pidemu.record.files import Record, read_record, write_record
 
 NAN = float("nan")
 

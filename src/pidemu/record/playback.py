@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pidemu.emulator import Controller, Event
 from pidemu.errors import RecordError, ScanError
-from pidemu.records import Floats, Record
+from pidemu.record.files import Floats, Record
 from pidemu.settings import Settings
 
 _UNEVEN: Final = 0.01

@@ -9,7 +9,7 @@ import pytest
 
 import pidemu
 from pidemu.errors import ScanError
-from pidemu.standard import StandardRecord, scale_of, standard_record
+from pidemu.record.standard import StandardRecord, scale_of, standard_record
 
 
 def part(record: StandardRecord, name: str) -> tuple[list[float], list[float], list[float]]:

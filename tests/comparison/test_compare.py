@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import RecordError, ScanError
-from pidemu.records import Floats, Record
-from pidemu.sampling import Scale, sampled
+from pidemu.record.files import Floats, Record
+from pidemu.record.sampling import Scale, sampled
+from pidemu.record.standard import StandardRecord, standard_record
 from pidemu.settings import Settings
-from pidemu.standard import StandardRecord, standard_record
 from tests.helpers import dials_of
 
 NAN = math.nan

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from pidemu.canonical import default_scan
+from pidemu.comparison.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, plain_settings, run_on
 from pidemu.errors import ScanError
 from pidemu.plain import json_safe
-from pidemu.playback import even_step
-from pidemu.records import Floats, Record, read_record
-from pidemu.sampling import Scale, limits_for, mode_segments
+from pidemu.record.files import Floats, Record, read_record
+from pidemu.record.playback import even_step
+from pidemu.record.sampling import Scale, limits_for, mode_segments
+from pidemu.record.standard import REST, Segment, StandardRecord, scale_of, standard_record
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
-from pidemu.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, plain_settings, run_on
-from pidemu.standard import REST, Segment, StandardRecord, scale_of, standard_record
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def compare(
     settings : sequence of Settings
         The controllers' settings, two or more.
     record : Record or path, optional
-        Recorded signals; by default the standard record (`pidemu.standard.standard_record`), scaled to the first controller.
+        Recorded signals; by default the standard record (`pidemu.record.standard.standard_record`), scaled to the first controller.
     scan : float or sequence of float, optional
         Scan interval of all, or of each [s]; by default the record's, else that of the first card. A controller whose interval is
         not the record's reads what was recorded last.

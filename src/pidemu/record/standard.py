@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pidemu.errors import ScanError
-from pidemu.records import Floats, Record
+from pidemu.record.files import Floats, Record
 from pidemu.settings import Settings
 
 REST: Final = 50.0

@@ -12,11 +12,11 @@ import numpy as np
 
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError
-from pidemu.playback import Timing, even_step, modes, spells, times_of, timing
-from pidemu.records import Floats, Record
+from pidemu.record.files import Floats, Record
+from pidemu.record.playback import Timing, even_step, modes, spells, times_of, timing
+from pidemu.record.standard import Segment, StandardRecord, standard_record
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
-from pidemu.standard import Segment, StandardRecord, standard_record
 
 _LIKE_PV = ("sp", "pv", "cascade")
 _LIKE_OUTPUT = ("manual", "output", "track", "external_reset", "feedforward")

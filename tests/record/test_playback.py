@@ -10,8 +10,8 @@ import pytest
 import pidemu
 from pidemu.emulator import Event
 from pidemu.errors import RecordError, ScanError
-from pidemu.playback import Playback, Saturation, even_step, modes, play, spells, timing, unsupported
-from pidemu.records import Floats, Record
+from pidemu.record.files import Floats, Record
+from pidemu.record.playback import Playback, Saturation, even_step, modes, play, spells, timing, unsupported
 
 NAN = math.nan
 PI = pidemu.load_card("generic/standard").settings(K=2, Ti=10)

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from pidemu.playback import Playback, play, unsupported
-from pidemu.records import Floats, Record
-from pidemu.sampling import Scale, controller_for, sampled
+from pidemu.record.files import Floats, Record
+from pidemu.record.playback import Playback, play, unsupported
+from pidemu.record.sampling import Scale, controller_for, sampled
+from pidemu.record.standard import Segment
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
-from pidemu.standard import Segment
 
 Limits = tuple[float, float]
 _HAIR = 1e-6

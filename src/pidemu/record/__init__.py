@@ -1,0 +1,1 @@
+"""Recorded and standard signals: read, sampled, played to a controller."""
