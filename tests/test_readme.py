@@ -28,7 +28,7 @@ def test_the_python_example_gives_what_its_comments_say() -> None:
     for line in python_block(TEXT).splitlines():
         code, _, comment = line.partition("  #")
         expected = comment.strip()
-        if expected and re.match(r"^([\d.'\"]|True|False)", expected):
+        if expected and re.match(r"^([\d.'\"(\[]|True|False)", expected):
             assert eval(code, names) == eval(expected), line
             checked += 1
         elif code.strip():
