@@ -170,7 +170,8 @@ def made_up_card(**fields: Any) -> Card:
 
 def outputs(program: Program, sp: Floats, pv: Floats, auto: Floats | None = None, manual: Floats | None = None) -> Floats:
     """Run a program from its initial state."""
-    state = list(program.initial)
+    functions = compiled(program)
+    state = list(functions.initial)
     modes = np.ones_like(sp) if auto is None else auto
     held = np.full_like(sp, math.nan) if manual is None else manual
-    return np.array(compiled(program).run(state, sp.tolist(), pv.tolist(), modes.tolist(), held.tolist()))
+    return np.array(functions.run(state, sp.tolist(), pv.tolist(), modes.tolist(), held.tolist()))

@@ -151,16 +151,10 @@ def test_a_bias_that_is_no_finite_number_is_refused(value: float) -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_signal_that_is_no_finite_number_is_refused_and_changes_nothing(value: float) -> None:
+def test_a_signal_that_is_no_finite_number_holds_the_output_and_an_event_says_so(value: float) -> None:
     ctl = controller()
-    ctl.scan(sp=50.0, pv=49.0)
-    before = ctl.state
-    for sp, pv in ((value, 50.0), (50.0, value)):
-        with pytest.raises(ScanError, match="must be finite numbers"):
-            ctl.scan(sp=sp, pv=pv)
-        with pytest.raises(ScanError, match=r"not a finite number in sample 1 \(counted from 0\)"):
-            ctl.run(sp=[50.0, sp], pv=[50.0, pv])
-    assert before == ctl.state
+    assert ctl.run(sp=[50.0, value, 51.0, 51.0], pv=[50.0, 50.0, value, 50.0]).tolist() == [40.0, 40.0, 40.0, 42.25]
+    assert [e.text for e in ctl.events[1:]] == [f"setpoint is {value}: output held", f"measurement is {value}: output held"]
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf])

@@ -58,8 +58,8 @@ class Shape:
         ``L`` of gain-linear.
     over : float
         The error at which squared and gain-linear have gain 1 [%].
-    on : {"error", "proportional", "integral"}
-        Which terms' error.
+    on_integral, on_proportional, on_cascade : bool
+        Whether the error of I, of P, and of P in cascade is shaped.
     """
 
     kind: Literal["gap", "squared", "gain-linear"]
@@ -70,7 +70,9 @@ class Shape:
     open_edge: bool = False
     linearity: float = 1.0
     over: float = 100.0
-    on: Literal["error", "proportional", "integral"] = "error"
+    on_integral: bool = True
+    on_proportional: bool = True
+    on_cascade: bool = True
 
 
 @dataclass(frozen=True, slots=True)

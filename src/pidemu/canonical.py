@@ -252,7 +252,7 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
     if (error.shape == "gap" and not band) or (error.shape == "gain-linear" and linearity == 1):
         return None
     gain = read.value(error.gain) if isinstance(error.gain, str) else error.gain
-    on = "integral" if error.on == "error" and equation.proportional.on == "pv" else error.on
+    in_cascade = equation.proportional if equation.cascade is None else equation.cascade.proportional
     return Shape(
         kind=error.shape,
         band=band,
@@ -262,7 +262,9 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
         open_edge=error.edge == "outside",
         linearity=linearity,
         over=error.over,
-        on=on,
+        on_integral=error.on != "proportional",
+        on_proportional=error.on != "integral" and equation.proportional.on != "pv",
+        on_cascade=error.on != "integral" and in_cascade.on != "pv",
     )
 
 

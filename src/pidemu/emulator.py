@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from math import isfinite, isinf, isnan, nan
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,44 +12,16 @@ import numpy.typing as npt
 from pidemu.canonical import default_scan
 from pidemu.card.models import Faults
 from pidemu.errors import ScanError, suggest
+from pidemu.running import Running, resting
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
+from pidemu.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, spells
 
 if TYPE_CHECKING:
     from pidemu.targets.python import Compiled
 
 Engine = Literal["python"]
-Mode = Literal["power-up", "manual", "automatic", "cascade", "tracking", "hold"]
-Floats = npt.NDArray[np.float64]
-
-_MODES: Final[tuple[Mode, ...]] = ("manual", "automatic", "cascade", "tracking", "hold")
-_SIGNALS: Final = {"cascade": "cascade", "track": "track", "external_reset": "reset", "feedforward": "feedforward"}
-"""Name of the program's input by the name of the argument."""
-_REMEMBERED: Final = 64
-"""Programs kept for other scan intervals."""
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened while a controller ran.
-
-    Attributes
-    ----------
-    scan : int
-        Which scan, counted from 0.
-    kind : {"transfer", "settings", "signal", "interval"}
-        A change of mode, of settings, a signal that is no number, or a scan interval that is none.
-    text : str
-        What happened.
-    bump : float
-        What the output moved by in this scan [as output limits]; for `settings`, how much further than without the change.
-    """
-
-    scan: int
-    kind: Literal["transfer", "settings", "signal", "interval"]
-    text: str
-    bump: float = 0.0
 
 
 def _pair(limits: Sequence[float]) -> tuple[float, float]:
@@ -136,60 +105,48 @@ class Controller:
         self._mode: Mode = "power-up"
         self._count = 0
         self._last: tuple[float, ...] = ()
-        self._use(settings)
-        self._state: list[float] = list(self._compiled.initial)
+        self._use(settings, self._running_with(settings))
 
-    def _use(self, settings: Settings) -> None:
-        """Compile the program of settings."""
-        from pidemu.targets.python import compiled
-
+    def _use(self, settings: Settings, running: Running) -> None:
+        """Go on with settings and their program."""
         self.settings = settings
         self._faults = settings.equation.faults or Faults()
-        self.program: Program = self._program(self.interval)
-        self._compiled: Compiled = compiled(self.program)
-        self._scan = self._compiled.scan
-        self._others: dict[float, Compiled] = {}
+        self._running = running
+        self.program: Program = running.program
+        self._scan, self._state = running.compiled.scan, running.state
         self._know_the_everyday_scan()
 
-    def _program(self, h: float) -> Program:
-        return build(
-            self.settings.algorithm(own_units=True, scan=h),
-            h,
-            action=self._action,
-            limits=self._limits,
-            bias=self._bias,
-            initial_output=self._initial_output,
-            signals=self._signals,
-            title=f"{self.settings.summary}; scan {self.interval:g} s, {self._action} acting",
-        )
+    def _running_with(self, settings: Settings) -> Running:
+        """Return the program of settings, at its start."""
 
-    def _at(self, h: float) -> Compiled:
-        """Return the compiled program for another scan interval [s]."""
-        from pidemu.targets.python import compiled
+        def make(h: float, *, at_rest: bool = False) -> Program:
+            a = settings.algorithm(own_units=True, scan=h)
+            return build(
+                resting(a) if at_rest else a,
+                h,
+                action=self._action,
+                limits=self._limits,
+                bias=self._bias,
+                initial_output=self._initial_output,
+                signals=self._signals,
+                title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
+            )
 
-        if h == self.interval:
-            return self._compiled
-        found = self._others.get(h)
-        if found is None:
-            if len(self._others) >= _REMEMBERED:
-                self._others.clear()
-            program = self._program(h)
-            if [q.name for q in program.states] != [q.name for q in self.program.states]:
-                raise ScanError(
-                    f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
-                )
-            found = self._others[h] = compiled(program, like=(self.program, self._compiled))
-        return found
+        return Running(make, self.interval)
+
+    def _know_the_everyday_scan(self) -> None:
+        """Keep in mind whether a scan without anything special goes straight to the program."""
+        self._plain = self._mode == "automatic" and not self._signals and self.program.precision == "float64"
 
     @property
     def state(self) -> dict[str, float]:
         """What the program keeps from scan to scan, by name."""
-        return {q.name: float(value) for q, value in zip(self.program.states, self._state, strict=True)}
+        return self._running.named()
 
     @property
     def output(self) -> float:
         """The last output."""
-        return self.state["u"]
+        return self._running["u"]
 
     @property
     def mode(self) -> Mode:
@@ -198,7 +155,7 @@ class Controller:
 
     def reset(self) -> None:
         """Go back to before the first scan; the settings stay."""
-        self._state[:] = self._compiled.initial
+        self._running.reset()
         self._mode, self._count, self._last = "power-up", 0, ()
         self.events.clear()
         self._know_the_everyday_scan()
@@ -229,10 +186,9 @@ class Controller:
                 raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
             if not isfinite(value):
                 raise ScanError(f"the state {name} = {value} is not a finite number")
-        running = [name for name in ("on", "begun") if "I" in states and name in names]
-        for name, value in (dict.fromkeys(running, 1.0) | states).items():
-            kind = type(self._compiled.initial[names.index(name)])  # float, or what the program rounds to
-            self._state[names.index(name)] = kind(value)
+        running = {name: 1.0 for name in ("on", "begun") if "I" in states and name in names}
+        for name, value in (running | states).items():
+            self._running[name] = value
 
     def change(self, settings: Settings | Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Change settings while running, as the real controller takes it (specs/equations.md, section 6).
@@ -263,38 +219,18 @@ class Controller:
         new = settings if isinstance(settings, Settings) else old.changed({**(settings or {}), **values})
         if new.card.id != old.card.id:
             raise ScanError(f"the controller runs {old.card.id}; settings of {new.card.id} need a controller of their own")
-        before, compiled_before, state = self.program, self._compiled, self.state
-        try:
-            self._use(new)
-        except ScanError:
-            self._use(old)
-            raise
-        self._carry(state)
-        if self._last:
+        before, after = self._running, self._running_with(new)
+        last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
+        after.take_over(before.named(), last)
+        if last:
             if new.algorithm().bumpless_changes and self._mode in ("automatic", "cascade"):
-                self._keep_output(before, state)
-            expected = compiled_before.scan([state[q.name] for q in before.states], *self._last)
-            bump = float(self._compiled.scan(list(self._state), *self._last)) - float(expected)
-            what = ", ".join(f"{n} = {v.value:g}" for n, v in new.items() if n not in old or old[n].value != v.value)
-            options = ", ".join(f"{n} = {c}" for n, c in new.options.items() if old.options[n] != c)
-            self.events.append(Event(self._count, "settings", ", ".join(filter(None, (what, options))) or "no change", bump))
+                after.keep_output(before, last)
+            bump = after.would_be(last) - before.would_be(last)
+            changed = [f"{n} = {v.value:g}" for n, v in new.items() if n not in old or old[n].value != v.value]
+            changed += [f"{n} = {c}" for n, c in new.options.items() if old.options[n] != c]
+            self.events.append(Event(self._count, "settings", ", ".join(changed) or "no change", bump))
+        self._use(new, after)
         return new
-
-    def _carry(self, state: Mapping[str, float]) -> None:
-        """Take over the states of the program before; states that it did not have start at rest, from the last signals."""
-        fresh = list(self._compiled.initial)
-        if self._last and any(q.name not in state for q in self.program.states):
-            named = dict(zip((q.name for q in self.program.inputs), self._last, strict=False))
-            named |= {"auto": 0.0, "manual": state["u"], "track": nan}
-            self._compiled.scan(fresh, *(named.get(q.name, nan) for q in self.program.inputs))
-        self._state = [state.get(q.name, float(x)) for q, x in zip(self.program.states, fresh, strict=True)]
-
-    def _keep_output(self, before: Program, state: Mapping[str, float]) -> None:
-        """Move the integral by what the proportional term becomes less, at the last signals: the listing's parameter change."""
-        places = {q.name: i for i, q in enumerate(self.program.states)}
-        if "I" in places and "P" in {assign.name for assign in before.body} & {assign.name for assign in self.program.body}:
-            old = _value("P", before, [state[q.name] for q in before.states], self._last)
-            self._state[places["I"]] += old - _value("P", self.program, list(self._state), self._last)
 
     def scan(
         self,
@@ -351,7 +287,7 @@ class Controller:
             self._count += 1
             return self._scan(self._state, sp, pv, 1.0, nan)
         signals = (cascade, track, external_reset, feedforward)
-        given = {name: float(x) for name, x in zip(_SIGNALS, signals, strict=True) if x is not None}
+        given = {name: float(x) for name, x in zip(SIGNALS, signals, strict=True) if x is not None}
         return self._any_scan(sp, pv, auto, nan if manual is None else manual, given, hold, interval)
 
     def _any_scan(
@@ -360,16 +296,16 @@ class Controller:
         """Do a scan that is not the everyday one: another mode, other signals, what is wrong with them."""
         if given:
             self._read(given)
-        if isinf(by_hand):
-            raise ScanError(f"the manual output {by_hand} is not a finite number")
-        inputs = (sp, pv, 1.0 if auto else 0.0, by_hand, *(given.get(s, _absent(s)) for s in self._names))
-        mode: Mode = "automatic" if auto else "manual"
-        if auto and not isnan(given.get("cascade", nan)):
-            mode = "cascade"
-        if not isnan(given.get("track", nan)):
-            mode = "tracking"
-        compiled = self._compiled
-        if hold or interval is not None or not (isfinite(sp) and isfinite(pv)):
+        for name, value in (("manual", by_hand), *given.items()):
+            if name in FINITE and isinf(value):
+                raise ScanError(f"the {FINITE[name]} {value} is not a finite number")
+        signals = (
+            absent(s) if s == "feedforward" and given.get(s) != given.get(s) else given.get(s, absent(s)) for s in self._names
+        )
+        inputs = (sp, pv, 1.0 if auto else 0.0, by_hand, *signals)
+        mode, compiled = mode_of(auto, given), self._running.compiled
+        bad = not (isfinite(sp) and isfinite(pv)) or isinf(given.get("cascade", nan))
+        if hold or interval is not None or bad:
             found = self._odd(mode, inputs, hold, interval)
             if isinstance(found, float):
                 return found
@@ -379,7 +315,7 @@ class Controller:
     def _scanned(self, compiled: Compiled, mode: Mode, inputs: tuple[float, ...]) -> float:
         """Do one scan and note a change of mode."""
         was = self.output
-        with self._quiet():
+        with self._running.quiet():
             u = float(compiled.scan(self._state, *inputs))
         if mode != self._mode:
             self._transfer(self._count, mode, u - was)
@@ -392,14 +328,10 @@ class Controller:
         self._mode = mode
         self._know_the_everyday_scan()
 
-    def _know_the_everyday_scan(self) -> None:
-        """Keep in mind whether a scan without anything special goes straight to the program."""
-        self._plain = self._mode == "automatic" and not self._signals and self.program.precision == "float64"
-
     @property
     def _names(self) -> list[str]:
         """The arguments that the program reads, in its order."""
-        wanted = {program: argument for argument, program in _SIGNALS.items()}
+        wanted = {program: argument for argument, program in SIGNALS.items()}
         return [wanted[q.name] for q in self.program.inputs[4:]]
 
     def _read(self, extra: Mapping[str, object]) -> None:
@@ -411,34 +343,36 @@ class Controller:
             )
         if "feedforward" in extra and a.feedforward is None:
             raise ScanError(f"{self.settings.card.id} states no feedforward input; leave the signal out")
-        wanted = tuple(program for argument, program in _SIGNALS.items() if argument in extra or program in self._signals)
+        wanted = tuple(program for argument, program in SIGNALS.items() if argument in extra or program in self._signals)
         if wanted != self._signals:
-            state, self._signals = self.state, wanted
-            if self._last:
-                old = dict(zip((q.name for q in self.program.inputs), self._last, strict=True))
-                self._use(self.settings)
-                self._last = tuple(old.get(q.name, 0.0 if q.name == "feedforward" else nan) for q in self.program.inputs)
-            else:
-                self._use(self.settings)
-            self._carry(state)
+            self._signals, state = wanted, self.state
+            last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
+            running = self._running_with(self.settings)
+            running.take_over(state, last)
+            self._use(self.settings, running)
+            self._last = running.inputs(last) if last else ()
 
     def _odd(self, mode: Mode, inputs: tuple[float, ...], hold: bool, interval: float | None) -> float | Compiled:
         """Deal with a hold, a bad signal or an uneven interval: return the output, or the program that computes it."""
         if hold:
             return self._stand("hold", inputs)
-        bad = not (isfinite(inputs[0]) and isfinite(inputs[1]))
+        named = {"setpoint": inputs[0], "measurement": inputs[1]}
+        if "cascade" in self._signals:
+            remote = inputs[4 + self._names.index("cascade")]
+            named["remote setpoint"] = 0.0 if isnan(remote) else remote  # none is none, and not a bad one
+        bad = [(name, value) for name, value in named.items() if not isfinite(value)]
         policy = self._faults.signal
         if bad:
-            name, value = ("setpoint", inputs[0]) if not isfinite(inputs[0]) else ("measurement", inputs[1])
+            name, value = bad[0]
             done = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}[policy]
             self.events.append(Event(self._count, "signal", f"{name} is {value}: {done}"))
             if policy != "propagate":
                 instead = None if policy == "hold" or mode not in ("automatic", "cascade") else nan if policy == "nan" else 0.0
                 return self._stand(mode, inputs, instead)
         if interval is None or self.settings.equation.scan.interval == "nominal":
-            return self._compiled
+            return self._running.compiled
         h = self._usable(interval)
-        return self._stand(mode, inputs) if h is None else self._at(h)
+        return self._stand(mode, inputs) if h is None else self._running.at(h)
 
     def _usable(self, interval: float) -> float | None:
         """Return the interval that the card computes with [s]; ``None`` where it does nothing."""
@@ -457,20 +391,21 @@ class Controller:
 
     def _stand(self, mode: Mode, inputs: tuple[float, ...], instead: float | None = None) -> float:
         """Compute nothing: the output is the last one, or the operator's in manual, or `instead`; the state stands still."""
-        names = [q.name for q in self.program.states]
-        at, was = names.index("u"), float(self._state[names.index("u")])
-        u = was
+        was = u = self.output
         if mode in ("manual", "tracking", "hold"):
             follow = inputs[4 + self._names.index("track")] if "track" in self._signals else nan
             by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else nan
-            u = was if isnan(by_hand) else by_hand
+            moved = not isnan(by_hand)
+            if moved:
+                self._running["u"] = u = by_hand
             if mode == "manual":
-                u = self._by_hand(u, moved=not isnan(by_hand))
-            self._state[at] = u
-            if "on" in names:
-                self._state[names.index("on")] = 0.0
-        if mode != self._mode:
-            self._transfer(self._count, mode, u - was)
+                self._running["u"] = u = self._by_hand(u, moved=moved)
+            u = self.output
+            for name, value in (("own", u), ("on", 0.0)):
+                if name in self._running:
+                    self._running[name] = value
+            if mode != self._mode:  # a transfer to automatic waits until something is computed
+                self._transfer(self._count, mode, u - was)
         self._count += 1
         return u if instead is None else instead
 
@@ -528,28 +463,29 @@ class Controller:
         if extra:
             self._read(extra)
         columns = {"sp": sp, "pv": pv, "auto": True if auto is None else auto, "manual": nan if manual is None else manual}
-        columns |= {s: extra.get(s, _absent(s)) for s in self._names}
+        columns |= {s: extra.get(s, absent(s)) for s in self._names}
         columns |= {"hold": False if hold is None else hold, "interval": self.interval if interval is None else interval}
-        signals = dict(zip(columns, _broadcast(list(columns.values())), strict=True))
+        signals = dict(zip(columns, broadcast(list(columns.values())), strict=True))
         if "feedforward" in signals:
             signals["feedforward"] = np.where(np.isnan(signals["feedforward"]), 0.0, signals["feedforward"])
         for name, bad in (
             ("the mode is not a number", np.isnan(signals["auto"])),
-            ("the manual output is infinite", np.isinf(signals["manual"])),
+            *((f"the {text} is infinite", np.isinf(signals[s])) for s, text in FINITE.items() if s in signals),
         ):
             if bad.any():
                 raise ScanError(f"{name} in sample {np.flatnonzero(bad)[0]} (counted from 0)")
         return self._run(signals, measured=interval is not None and self.settings.equation.scan.interval == "measured")
 
     def _run(self, signals: Mapping[str, Floats], measured: bool) -> Floats:
-        modes = _modes(signals)
+        modes = modes_of(signals)
         out = np.empty(modes.size)
         odd = (signals["hold"] > 0) | ~np.isfinite(signals["sp"]) | ~np.isfinite(signals["pv"])
+        odd |= np.isinf(signals.get("cascade", signals["sp"]))
         if measured:
             odd |= signals["interval"] != self.interval
         inputs = [signals[name] for name in ("sp", "pv", "auto", "manual", *self._names)]
-        for start, end in _spells(modes, odd):
-            mode = _MODES[modes[start]]
+        for start, end in spells(modes, odd):
+            mode = MODES[modes[start]]
             if odd[start]:
                 for i in range(start, end):
                     out[i] = self._odd_scan(mode, tuple(float(s[i]) for s in inputs), signals, i, measured)
@@ -568,59 +504,15 @@ class Controller:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
         was = self.output
         general = 1 if mode in ("automatic", "cascade") else out.size
-        with self._quiet():
-            out[:general] = self._compiled.run(self._state, *(s[:general].tolist() for s in inputs))
+        compiled = self._running.compiled
+        with self._running.quiet():
+            out[:general] = compiled.run(self._state, *(s[:general].tolist() for s in inputs))
             if general < out.size:
                 wanted = {q.name for q in self.program.inputs} - {"auto", "manual", "track"}
                 tail = [s[general:].tolist() for q, s in zip(self.program.inputs, inputs, strict=True) if q.name in wanted]
-                rest = self._compiled.run_automatic(self._state, *tail)
+                rest = compiled.run_automatic(self._state, *tail)
                 out[general:] = np.fromiter(rest, float, len(rest))
         if mode != self._mode:
             self._transfer(self._count, mode, float(out[0]) - was)
         self._last = tuple(float(s[-1]) for s in inputs)
         self._count += out.size
-
-    def _quiet(self) -> contextlib.AbstractContextManager[Any]:
-        """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
-        return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
-
-
-def _value(name: str, program: Program, state: list[float], inputs: tuple[float, ...]) -> float:
-    """Return what a program computes under a name in one scan."""
-    from pidemu.targets.python import compiled
-
-    return float(compiled(replace(program, output=name)).scan(state, *inputs))
-
-
-def _absent(signal: str) -> float:
-    """Return what a signal is where there is none."""
-    return 0.0 if signal == "feedforward" else nan
-
-
-def _broadcast(columns: Sequence[npt.ArrayLike]) -> list[Floats]:
-    arrays = [np.asarray(c, dtype=float) for c in columns]
-    try:
-        signals = np.broadcast_arrays(*(np.atleast_1d(a) for a in arrays))
-    except ValueError:
-        lengths = ", ".join(str(a.size) for a in arrays[:4])
-        raise ScanError(f"the signals have different lengths: {lengths}") from None
-    if signals[0].ndim != 1:
-        raise ScanError("the signals must be one-dimensional")
-    return list(signals)
-
-
-def _modes(signals: Mapping[str, Floats]) -> npt.NDArray[np.int_]:
-    """Return the number of the mode of every sample in `_MODES`."""
-    modes = np.where(signals["auto"] > 0, 1, 0)
-    if "cascade" in signals:
-        modes = np.where((modes == 1) & ~np.isnan(signals["cascade"]), 2, modes)
-    if "track" in signals:
-        modes = np.where(~np.isnan(signals["track"]), 3, modes)
-    return np.where(signals["hold"] > 0, 4, modes)
-
-
-def _spells(modes: npt.NDArray[np.int_], odd: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield start and end of every stretch in one mode that is odd or even throughout."""
-    if modes.size:
-        edges = np.flatnonzero((np.diff(modes) != 0) | (np.diff(odd.astype(int)) != 0)) + 1
-        yield from itertools.pairwise([0, *edges.tolist(), modes.size])

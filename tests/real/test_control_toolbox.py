@@ -144,8 +144,6 @@ def test_any_settings_and_manual_spells_agree_with_the_documented_computation(
     p, i, d = gains
     if not tracking and i and (math.sqrt(d / i) if d else p / i) < scan:
         tracking = 1.0  # the recommended value would be zero, which the real class divides by, or ring and magnify its rounding
-    if antiwindup == "back_calculation":
-        deadband = min(deadband, EPSILON)  # the correction within the band is a case of its own
     record = signals(seed)
     oracle = Pid(p, i, d, limits, antiwindup, *i_limits, tracking, deadband)
     expected = outputs(oracle, record, scan)
@@ -159,7 +157,7 @@ def test_any_settings_and_manual_spells_agree_with_the_documented_computation(
 @given(seed=st.integers(0, 10_000), antiwindup=st.sampled_from(["none", "back_calculation", "conditional_integration"]))
 def test_the_interval_is_the_measured_one_and_none_at_all_changes_nothing(seed: int, antiwindup: Scheme) -> None:
     record, intervals = signals(seed), uneven(seed, 200, 0.5)
-    intervals[(np.arange(200) % 7 == 3) & (record.auto > 0)] = 0.0
+    intervals[np.arange(200) % 7 == 3] = 0.0
     oracle = Pid(1.5, 0.2, 0.8, (0, 100), antiwindup)
     expected = outputs(oracle, record, intervals)
     assume(antiwindup != "conditional_integration" or oracle.edge > TOLERANCE * oracle.size)
@@ -188,7 +186,6 @@ def test_an_error_that_is_not_finite_gives_nan_and_changes_nothing() -> None:
     assert close(found, expected, TOLERANCE, oracle.size)
 
 
-@pytest.mark.xfail(strict=True, reason="integral.deadband stops the integration; the class stops the back-calculation as well")
 def test_within_the_deadband_nothing_is_calculated_back() -> None:
     limits = (-math.inf, 5.0)
     oracle = Pid(4.0, 0.5, 0.0, limits, "back_calculation", tracking_time_constant=2, error_deadband=3.0)

@@ -54,17 +54,17 @@ class Dahlin:
     def scan(self, r: float, y: float, auto: bool, manual: float) -> float:
         p, q, N = self.d.sampled(self.h)
         gain, e = (1 - q) / (self.d.Kp * (1 - p)), self.sign * (r - y)
+        past = self.past or [self.last] * (N + 1)  # before the first scan the output was the initial one, and for long
         if not auto:
             u = manual
-        elif not self.automatic:  # no increment at the transfer; what went before counts as if it had always been the last output
-            u = min(max(self.last, self.low), self.high)
-            self.past = [self.last] * (N + 1)
+        elif not self.automatic:  # no increment at the transfer; what went before counts as it was, by hand or not
+            u = min(max(past[-1], self.low), self.high)
         else:
-            u = q * self.past[-1] + (1 - q) * self.past[-(N + 1)] + gain * (e - p * self.e1)
+            u = q * past[-1] + (1 - q) * past[-(N + 1)] + gain * (e - p * self.e1)
             u = min(max(u, self.low), self.high)
-        self.past = [*self.past, u][-(N + 1) :]
+        self.past = [*past, u][-(N + 1) :]
         self.size = max(self.size, abs(gain * e), abs(u))
-        self.e1, self.last, self.automatic = e, u, auto
+        self.e1, self.automatic = e, auto
         return u
 
 
@@ -99,6 +99,17 @@ def test_the_card_equals_the_recursion_at_both_limits_and_through_manual_spells(
     ctl = pidemu.Controller(d.card(), scan=h, action=action, output_limits=bounds, initial_output=40.0)
     found = ctl.run(record.sp, record.pv, record.auto, record.manual)
     assert close(found, want, TOLERANCE, 100 * dahlin.size)
+
+
+def test_what_the_operator_did_within_the_dead_time_is_still_on_its_way_after_the_transfer() -> None:
+    d = Process(2.0, 10.0, 3.0, 5.0)
+    _, q, N = d.sampled(1.0)
+    ctl = pidemu.Controller(d.card(), scan=1.0, initial_output=40.0)
+    out = ctl.run(50.0, np.full(9, 50.0), [1, 0, 0, 0, 1, 1, 1, 1, 1], [0, 42, 46, 54, 0, 0, 0, 0, 0])
+    want = [40.0, 42.0, 46.0, 54.0, 54.0]
+    for _ in range(4):  # without error only the history moves it
+        want.append(q * want[-1] + (1 - q) * want[-(N + 1)])
+    assert out == pytest.approx(want)
 
 
 @settings(max_examples=40)

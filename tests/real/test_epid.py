@@ -129,17 +129,25 @@ def test_the_interval_is_the_measured_one(seed: int, KP: float, KI: float, KD: f
     assert close(found, expected, TOLERANCE, oracle.size)
 
 
-@settings(max_examples=15)
-@given(seed=st.integers(0, 10_000), KP=st.floats(0.2, 4), KI=st.floats(0.01, 1), ODEL=st.sampled_from([0.0, 0.5, 5.0]))
-def test_the_output_deadband_holds_small_changes_back(seed: int, KP: float, KI: float, ODEL: float) -> None:
+@settings(max_examples=30)
+@given(
+    seed=st.integers(0, 10_000),
+    KP=st.floats(0.2, 4),
+    KI=st.floats(0.01, 1),
+    ODEL=st.sampled_from([0.0, 0.5, 5.0]),
+    limits=st.sampled_from([(-1e6, 1e6), (0.0, 100.0), (-20.0, 40.0)]),
+)
+def test_the_output_deadband_holds_small_changes_back(
+    seed: int, KP: float, KI: float, ODEL: float, limits: tuple[float, float]
+) -> None:
     record = signals(seed).always_auto()
-    oracle = Epid(KP, KI, 0, -1e6, 1e6, ODEL)
+    oracle = Epid(KP, KI, 0, *limits, ODEL)
     expected = outputs(oracle, record, 0.5)
-    found = controller(KP, KI, 0, 0.5, (-1e6, 1e6), ODEL).run(record.sp, record.pv)
+    assume(oracle.edge > TOLERANCE * oracle.size)
+    found = controller(KP, KI, 0, 0.5, limits, ODEL).run(record.sp, record.pv)
     assert close(found, expected, TOLERANCE, oracle.size)
 
 
-@pytest.mark.xfail(strict=True, reason="freeze judges the output before the deadband; the record judges OVAL, which is behind it")
 def test_an_output_held_back_just_before_a_limit_is_not_at_the_limit() -> None:
     sp, pv = np.full(4, 50.0), np.array([46.4, 46.1, 46.1, 49.0])  # 18, and then 20 is too small a change
     oracle, ctl = Epid(5.0, 0.1, 0, 0, 20, 4.0), controller(5.0, 0.1, 0, 1.0, (0, 20), 4.0)
@@ -162,11 +170,26 @@ def test_a_value_beyond_the_limits_is_loaded_as_it_is() -> None:
     assert ctl.run([50.0, 50.0], [50.0, 60.0], [0, 1], 120.0).tolist() == [120.0, 100.0]  # 120 - 10 is still beyond
 
 
-@pytest.mark.xfail(strict=True, reason="integral.limits hold in every scan; the record limits I only together with an increment")
-def test_a_value_loaded_beyond_the_limits_stays_while_the_integral_is_frozen() -> None:
-    ctl = controller(1.0, 0.1, 0.0, 1.0, (0, 100))
-    found = ctl.run(50.0, [50.0, 50.0, 49.0, 80.0], [0, 1, 1, 1], 120.0)
-    assert found.tolist() == pytest.approx([120.0, 100.0, 100.0, 70.0])  # then I - 3 is limited to 100, and P is -30
+def test_a_value_loaded_beyond_the_limits_stays_in_the_record_while_it_is_frozen_and_is_limited_in_the_card() -> None:
+    record = Signals(np.full(4, 50.0), np.array([50.0, 50.0, 49.0, 80.0]), np.array([0.0, 1, 1, 1]), np.full(4, 120.0))
+    oracle = Epid(1.0, 0.1, 0.0, 0, 100)
+    assert outputs(oracle, record, 1.0).tolist() == [120.0, 100.0, 100.0, 70.0]  # 120 - 3 is limited to 100, and P is -30
+    found = controller(1.0, 0.1, 0.0, 1.0, (0, 100)).run(record.sp, record.pv, record.auto, record.manual)
+    assert found.tolist() == pytest.approx([120.0, 100.0, 100.0, 67.0])  # already 100 one scan before, then 100 - 3
+
+
+def test_in_manual_the_output_deadband_compares_with_the_records_own_output_and_in_the_card_with_the_operators() -> None:
+    record = Signals(np.full(3, 50.0), np.array([40.0, 40.0, 40.0]), np.array([1.0, 0, 1]), np.full(3, 23.0))
+    oracle = Epid(1.0, 0.1, 0.0, 0, 100, ODEL=5.0, outl=20.0)
+    assert outputs(oracle, record, 1.0).tolist() == [30.0, 23.0, 33.0 - 3.0]  # 33 is near the 30 that OVAL still is
+    found = controller(1.0, 0.1, 0.0, 1.0, (0, 100), 5.0, 20.0).run(record.sp, record.pv, record.auto, record.manual)
+    assert found.tolist() == [30.0, 23.0, 33.0]
+
+
+def test_without_gain_the_record_holds_what_was_loaded_and_the_card_gives_zero() -> None:
+    record = signals(5).always_auto()
+    assert set(outputs(Epid(0.0, 0.1, 0.0, 0, 100, outl=25.0), record, 1.0).tolist()) == {25.0}
+    assert set(controller(0.0, 0.1, 0.0, 1.0, (0, 100), 0.0, 25.0).run(record.sp, record.pv).tolist()) == {0.0}
 
 
 def test_without_integral_the_output_is_proportional_whatever_it_was_before() -> None:

@@ -45,7 +45,7 @@ class Block:
     automatic: bool = False
     size: float = field(default=1.0)
 
-    def scan(self, SP: float, IN: float, auto: bool, manual: float, CAS_IN: float) -> float:
+    def scan(self, SP: float, IN: float, auto: bool, manual: float, CAS_IN: float, BKCAL_IN: float = np.nan) -> float:
         d, dT = self.d, self.dT
         cascade = auto and not np.isnan(CAS_IN)
         SP = CAS_IN if cascade else SP
@@ -61,7 +61,8 @@ class Block:
             self.OUT = manual
         else:
             dMV = sum(terms) if self.automatic else 0.0  # none in the first automatic scan
-            self.OUT = min(max(self.OUT + (dMV if self.action == "direct" else -dMV), self.low), self.high)
+            read_back = self.OUT if np.isnan(BKCAL_IN) else BKCAL_IN
+            self.OUT = min(max(read_back + (dMV if self.action == "direct" else -dMV), self.low), self.high)
         self.automatic = auto
         self.size = max(self.size, *map(abs, terms), d.GAIN * (abs(PV) + abs(SP)), d.GAIN * d.RATE / dT * abs(PV))
         return self.OUT
@@ -78,8 +79,19 @@ def remote(record: Signals, seed: int) -> Floats:
     return (out + np.cumsum(drift)).round(3)
 
 
-def expected(block: Block, record: Signals, cascade: Floats) -> Floats:
-    columns = zip(record.sp, record.pv, record.auto > 0, record.manual, cascade, strict=True)
+def read_back(record: Signals, seed: int) -> Floats:
+    """Return a read-back output, NaN in spells where nothing is read back."""
+    rng = np.random.default_rng(seed + 2)
+    out = 50 + np.cumsum(rng.normal(0, 3, len(record)))
+    for _ in range(3):
+        start = int(rng.integers(0, len(record)))
+        out[start : start + int(rng.integers(1, 40))] = np.nan
+    return out.round(3)
+
+
+def expected(block: Block, record: Signals, cascade: Floats, back: Floats | None = None) -> Floats:
+    back = np.full(len(record), np.nan) if back is None else back
+    columns = zip(record.sp, record.pv, record.auto > 0, record.manual, cascade, back, strict=True)
     return np.array([block.scan(*row) for row in columns])
 
 
@@ -110,6 +122,46 @@ def test_the_card_equals_the_published_increments_in_every_mode(
     ctl = pidemu.Controller(d.card(), scan=dT, action=action, output_limits=bounds, initial_output=40.0)
     found = ctl.run(record.sp, record.pv, record.auto, record.manual, cascade=cascade)
     assert close(found, want, TOLERANCE, 10 * block.size)
+
+
+@settings(max_examples=40)
+@given(
+    dials,
+    st.floats(0.1, 5),
+    st.sampled_from(["reverse", "direct"]),
+    st.sampled_from([(0.0, 100.0), (30.0, 60.0), (-1e9, 1e9)]),
+    st.integers(0, 10**6),
+)
+def test_the_change_is_added_to_what_is_read_back_from_downstream(
+    d: Dials, dT: float, action: Action, bounds: tuple[float, float], seed: int
+) -> None:
+    record = signals(seed)
+    cascade, back = remote(record, seed), read_back(record, seed)
+    block = Block(d, dT, action, *bounds, OUT=40.0)
+    want = expected(block, record, cascade, back)
+    ctl = pidemu.Controller(d.card(), scan=dT, action=action, output_limits=bounds, initial_output=40.0)
+    found = ctl.run(record.sp, record.pv, record.auto, record.manual, cascade=cascade, external_reset=back)
+    assert close(found, want, TOLERANCE, 10 * block.size)
+
+
+def test_a_limit_downstream_that_is_read_back_does_not_wind_the_block_up() -> None:
+    d = Dials(GAIN=1.0, RESET=10.0, RATE=0.0)
+
+    def run(reads: bool) -> list[float]:
+        ctl = pidemu.Controller(d.card(), scan=1.0, initial_output=50.0)
+        block, sent = Block(d, 1.0, "reverse", 0, 100, OUT=50.0), [50.0]
+        for k in range(60):
+            back = min(sent[-1], 60.0)  # downstream takes no more than 60
+            SP = 60.0 if k < 40 else 40.0
+            sent.append(ctl.scan(SP, 50.0, external_reset=back) if reads else ctl.scan(SP, 50.0))
+            assert sent[-1] == pytest.approx(block.scan(SP, 50.0, True, 0.0, np.nan, back if reads else np.nan), abs=1e-9)
+        return sent[1:]
+
+    reading, alone = run(True), run(False)
+    assert reading[39] == pytest.approx(61.0)  # one increment of 10 h/Ti beyond what is read back
+    assert reading[40] == pytest.approx(59.0)
+    assert alone[39] == pytest.approx(89.0)
+    assert alone[40] == pytest.approx(88.0)
 
 
 @settings(max_examples=20)

@@ -69,7 +69,7 @@ class TestTrace:
 @settings(max_examples=30)
 @given(
     seed=st.integers(0, 10_000),
-    KP=st.sampled_from([1.0, -1.0]) | st.floats(0.1, 8) | st.floats(-8, -0.1),
+    KP=st.sampled_from([1.0, -1.0, 0.0]) | st.floats(0.1, 8) | st.floats(-8, -0.1),
     TR=st.floats(0.5, 500),
     TD=st.just(0.0) | st.floats(0.01, 20),
     scan=st.sampled_from([0.05, 0.5, 2.0]),

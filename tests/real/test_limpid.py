@@ -82,9 +82,16 @@ class Sampled:
         total = sum(parts)
         out = min(max(total, self.low), self.high)
         if "I" in d.kind:
-            self.integral += h / (d.Ni * d.Ti) * (out - total)
+            self.integral += self.pull(total, out)
         self.size = max(self.size, *map(abs, parts), abs(d.k * d.Nd * x), abs(self.integral))
         return out
+
+    def pull(self, total: float, out: float) -> float:
+        """What the tracking adds to the integral: h/(Ni Ti) of what is cut off; an implicit solver's sum holds that already."""
+        share = self.h / (self.d.Ni * self.d.Ti)
+        if self.method == "sampled":
+            total = (total + share * out) / (1 + share)  # solves v = total + share (out - v)
+        return share * (out - total)
 
 
 def expected(oracle: Sampled, record: Signals, ff: Floats | None = None) -> Floats:
@@ -108,15 +115,30 @@ dials = st.builds(
 
 
 @settings(max_examples=30)
-@given(dials, st.sampled_from(["continuous", "sampled"]), st.floats(0.01, 0.2), st.integers(0, 10**6))
+@given(dials, st.sampled_from(["continuous", "sampled"]), st.floats(0.01, 0.2), st.sampled_from([1, 100]), st.integers(0, 10**6))
 def test_every_controller_type_and_method_equals_the_stepwise_computation_also_at_limits_and_beside_manual_spells(
-    d: Dials, method: str, h: float, seed: int
+    d: Dials, method: str, h: float, longer: int, seed: int
 ) -> None:
     record = signals(seed)
+    h *= longer if method == "sampled" else 1  # the explicit pull of the other method rings beyond twice the tracking time
     oracle = Sampled(d, h, 5.0, 90.0, method)
     want = expected(oracle, record)
     ctl = pidemu.Controller(d.card(method), scan=h, output_limits=(5.0, 90.0))
     assert close(ctl.run(record.sp, record.pv, record.auto, record.manual), want, TOLERANCE, oracle.size)
+
+
+@pytest.mark.parametrize("h", [0.5, 5.0, 50.0])
+def test_however_long_the_step_an_implicit_solver_pulls_the_integral_back_to_the_limit_and_not_beyond(h: float) -> None:
+    d = Dials(k=2.0, Ti=0.5, kind="PI", Ni=0.9)  # h is up to 111 tracking times
+    ctl = pidemu.Controller(d.card("sampled"), scan=h, output_limits=(-1.0, 1.0))
+    found = ctl.run(10.0, np.zeros(50))
+    assert set(found.tolist()) == {1.0}
+    steady = 1.0 + d.k * 10.0 * d.Ni  # the sum at which the pull takes what the error adds
+    assert ctl.state["I"] + d.k * 10.0 == pytest.approx(steady, rel=1e-6)
+    oracle = Sampled(d, h, -1.0, 1.0, "sampled")
+    for _ in range(50):
+        oracle.step(10.0, 0.0)
+    assert ctl.state["I"] == pytest.approx(oracle.integral, rel=1e-12)
 
 
 @settings(max_examples=20)

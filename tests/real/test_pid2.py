@@ -82,27 +82,28 @@ def dials(draw: st.DrawFn) -> Dials:
     )
 
 
-def from_zero(record: Signals) -> tuple[Floats, Floats]:
-    """Return setpoint and measurement behind one sample at zero."""
-    return np.concatenate([[0.0], record.sp]), np.concatenate([[0.0], record.pv])
+def starts(record: Signals, at_rest: bool) -> tuple[Floats, Floats]:
+    """Return setpoint and measurement, behind one sample at zero or away from zero at once."""
+    lead = [0.0] if at_rest else []
+    return np.concatenate([lead, record.sp]), np.concatenate([lead, record.pv])
 
 
 @settings(max_examples=40)
-@given(dials(), st.integers(0, 10**6))
-def test_the_parallel_form_equals_its_transfer_functions(d: Dials, seed: int) -> None:
-    r, y = from_zero(signals(seed))
+@given(dials(), st.integers(0, 10**6), st.booleans())
+def test_the_parallel_form_equals_its_transfer_functions(d: Dials, seed: int, at_rest: bool) -> None:
+    r, y = starts(signals(seed), at_rest)
     want, size = d.simulated(r, y)
     assert close(pidemu.Controller(d.card("parallel"), scan=d.h).run(r, y), want, TOLERANCE, size)
 
 
 @settings(max_examples=40)
-@given(dials(), st.integers(0, 10**6))
-def test_the_standard_form_equals_the_parallel_gains_it_stands_for(d: Dials, seed: int) -> None:
+@given(dials(), st.integers(0, 10**6), st.booleans())
+def test_the_standard_form_equals_the_parallel_gains_it_stands_for(d: Dials, seed: int, at_rest: bool) -> None:
     assume(d.Kp)  # it multiplies all terms
     assume(d.Ki * d.Kp >= 0)
     assume(d.Kd * d.Kp >= 0)  # times are not negative
     assume(d.Kd or not d.Tf)  # without derivative time there is no divisor that gives a filter
-    r, y = from_zero(signals(seed))
+    r, y = starts(signals(seed), at_rest)
     want, size = d.simulated(r, y)
     assert close(pidemu.Controller(d.card("standard"), scan=d.h).run(r, y), want, 10 * TOLERANCE, size)
 
@@ -111,17 +112,15 @@ def test_the_standard_form_equals_the_parallel_gains_it_stands_for(d: Dials, see
 def test_every_pair_of_formulas_is_right_on_one_record(formula: str) -> None:
     for other in FORMULAS:
         d = Dials(2.0, 0.3, 4.0, 1.5, 0.6, 0.2, formula, other, 0.5)
-        r, y = from_zero(signals(7))
+        r, y = starts(signals(7), False)
         want, size = d.simulated(r, y)
         assert close(pidemu.Controller(d.card("parallel"), scan=0.5).run(r, y), want, TOLERANCE, size)
 
 
-@pytest.mark.parametrize("formula", ["ForwardEuler", "BackwardEuler"])
-def test_a_start_away_from_zero_is_a_start_from_the_zero_state_all_the_same(formula: str) -> None:
-    d = Dials(2.0, 0.3, 4.0, 1.5, 0.6, 0.2, formula, "BackwardEuler", 0.5)
-    record = signals(8)
-    want, size = d.simulated(record.sp, record.pv)
-    assert close(pidemu.Controller(d.card("parallel"), scan=0.5).run(record.sp, record.pv), want, TOLERANCE, size)
+@pytest.mark.parametrize(("formula", "share"), [("ForwardEuler", 0.0), ("BackwardEuler", 1.0), ("Trapezoidal", 0.5)])
+def test_from_the_zero_state_an_integrator_counts_this_share_of_the_first_error(formula: str, share: float) -> None:
+    d = Dials(0.0, 0.3, 0.0, 1.5, 1.0, 1.0, formula, "BackwardEuler", 0.5)
+    assert pidemu.Controller(d.card("parallel"), scan=0.5).scan(54.0, 50.0) == pytest.approx(share * 0.3 * 0.5 * 4.0)
 
 
 def test_a_spell_in_manual_leaves_the_transfer_function_running() -> None:

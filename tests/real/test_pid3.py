@@ -81,7 +81,7 @@ def expected(pid: Pid3, record: Signals) -> list[int]:
 
 dials = st.builds(
     Dials,
-    KP=st.integers(1, 2000) | st.integers(1, 32767),
+    KP=st.just(0) | st.integers(1, 2000) | st.integers(1, 32767),
     TI=st.just(0) | st.integers(1, 2000) | st.integers(1, 32767),
     TD=st.just(0) | st.integers(1, 500) | st.integers(1, 32767),
 )

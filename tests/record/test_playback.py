@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.emulator import Event
+from pidemu.signals import Event
 from pidemu.errors import RecordError, ScanError
 from pidemu.record.files import Floats, Record
 from pidemu.record.playback import Playback, Saturation, even_step, modes, play, spells, timing, unsupported

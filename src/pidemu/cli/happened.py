@@ -8,8 +8,8 @@ from typing import Final
 import click
 
 from pidemu.cli.common import number, table
-from pidemu.emulator import Event
 from pidemu.record.playback import NO_BUMP, Playback
+from pidemu.signals import Event
 
 _ROWS: Final = 12
 """Rows after which it is said how many more there are."""

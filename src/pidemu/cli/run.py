@@ -14,10 +14,10 @@ from pidemu.card.library import load_card
 from pidemu.cli.common import action_option, assignments, json_option, limits_option, number, print_json, vendors_option
 from pidemu.cli.happened import tell
 from pidemu.comparison.side_by_side import plain_settings
-from pidemu.emulator import Controller, Floats
+from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.plain import json_safe
-from pidemu.record.files import Record, read_record, write_record
+from pidemu.record.files import Floats, Record, read_record, write_record
 from pidemu.record.playback import Playback, Timing, play, timing
 from pidemu.scan.build import Action
 

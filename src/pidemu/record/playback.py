@@ -11,10 +11,11 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.emulator import Controller, Event
+from pidemu.emulator import Controller
 from pidemu.errors import RecordError, ScanError
 from pidemu.record.files import Floats, Record
 from pidemu.settings import Settings
+from pidemu.signals import Event
 
 _UNEVEN: Final = 0.01
 """Relative jitter of a time column that counts as none."""

@@ -69,7 +69,10 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
         I = scheme.term(_integral(b, a, t, needed, scheme, P, state, grown, moved))  # noqa: E741
     elif bias:
         I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
-    total = scheme.output(blocks.summed([P, I, t.D]))
+    inner = blocks.summed([P, I])
+    if a.windup == "recompute" and a.gate.without_derivative and not a.ki:
+        inner = b.let("PI", scheme.total(blocks.limited(scheme.output(inner), t.low, t.high)), "P within the limits (section 5)")
+    total = scheme.output(blocks.summed([inner, t.D]))
     if feed is not None and not a.feedforward_after:
         v: Expr = b.let("v", total + feed, "sum of the terms, with the feedforward (section 6)")
     else:
@@ -81,7 +84,8 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
         v = b.let("v_all", v + after, "sum of the terms and feedforward")
     final = output.stepped(b, a, t, out)
     if a.zero_first_output:
-        final = b.let("out_1", select(b.fresh, 0.0, final), "the first scan only prepares the block (section 6)")
+        nothing = blocks.limited(expr(0.0), t.low, t.high)
+        final = b.let("out_1", select(b.fresh, nothing, final), "the first scan only prepares the block (section 6)")
     if holds_sum and a.ki:
         _after_output(b, a, h, t, scheme, P, v, out, grown)
         _in_manual(b, a, t, scheme, P, manual)
@@ -173,8 +177,8 @@ def _integral(
     """Set the integral at a transfer, let it grow otherwise (section 6)."""
     now = None if a.integral_rule is Rule.FORWARD else grown
 
-    if a.gate.this_scan:
-        b.let("I_old", state, "integral before this scan's increment")
+    later = now if a.gate.this_scan else None
+    now = None if a.gate.this_scan else now
 
     def grow(base: Expr, holds: bool = False) -> Expr:
         total = base if now is None or holds else base + now
@@ -205,6 +209,10 @@ def _integral(
         b.let("I", select(b.fresh, grow(expr(0.0), a.first_scan_holds), state), "at power-up it starts at zero (section 6)")
     elif a.start in ("keep", "running"):
         b.let("I", select(b.fresh, needed, state), "the first scan is a transfer from the initial output (section 6)")
+    if later is not None:
+        b.let("I_old", state, "integral before this scan's increment")
+        at_once = not a.first_scan_holds and a.start not in ("bumpless", "tracked")
+        b.let("I", state + later if at_once else select(t.on, state + later, state), "with this scan's increment")
     _limit(b, a, t, state)
     if a.windup == "recompute" and a.gate.without_derivative and a.ki:
         _recomputed(b, a, t, scheme, P, None, state)
@@ -250,7 +258,7 @@ def _after_output(
     if a.windup == "recompute" and not a.gate.without_derivative:
         _recomputed(b, a, t, scheme, P, t.D, state)
     if a.windup == "freeze" and a.gate.this_scan:
-        beyond = (v > t.high) | (v < t.low)
+        beyond = (v >= t.high) | (v <= t.low)
         b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
     if a.windup == "reset-outside-band":
         reach = blocks.magnitude(scheme.output(P if a.b == 1 else t.signals.e * b.coefficient("kp_band", a.kp, "gain", "%/%")))
@@ -278,7 +286,8 @@ def _recomputed(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, D: Ex
     total = b.let("v_I", scheme.output(blocks.summed([P, scheme.term(state), D])), "sum that is held against the limits")
     high = scheme.state(blocks.difference(scheme.total(t.high), P, D))
     low = scheme.state(blocks.difference(scheme.total(t.low), P, D))
-    b.let("I", select(total >= t.high, high, select(total <= t.low, low, state)), "recompute: what the limit leaves (section 5)")
+    new = select(total >= t.high, high, select(total <= t.low, low, state))
+    b.let("I", select(b.fresh, state, new) if a.zero_first_output else new, "recompute: what the limit leaves (section 5)")
     if a.gate.clamped:
         b.let("I", blocks.limited(state, t.low, t.high), "within the output limits (section 5)")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, Shape
 from pidemu.scan import blocks
 from pidemu.scan.blocks import Builder
 from pidemu.scan.program import Expr, Name, equal, select
@@ -77,13 +77,14 @@ def terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initi
     s = _signals(b, a, h, fresh)
     outside = a.holds == "ki e" or a.velocity
     if a.kp:
-        P: Expr = b.let("P", _proportional(b, a, s, outside, fresh), "proportional term" if outside else "proportional signal")
+        with_gain = outside and not a.velocity  # increments are those of the signal, so that a changed gain acts on them alone
+        P: Expr = b.let("P", _proportional(b, a, s, with_gain, fresh), "proportional term" if with_gain else "signal of P")
     else:
         P = b.let("P", 0.0, "no proportional term")
     D = None
     if a.kd:
         D = _derivative(b, a, s, fresh, a.kd if outside else a.kd / a.kp, h)
-    w = s.e if a.shape is not None and a.shape.on == "proportional" else s.shaped
+    w = s.e if a.shape is not None and not a.shape.on_integral else s.shaped
     if a.series and D is not None and a.ki:
         per_gain = b.coefficient("per_kp", 1 / a.kp, "1/kp", "-")
         w = b.let("w", w + per_gain * D, "signal of the integral: series form (section 2)")
@@ -150,24 +151,28 @@ def _weighted(b: Builder, weight: float, name: str, s: Signals) -> Expr:
 def proportional_signal(b: Builder, a: Algorithm, s: Signals, fresh: Expr) -> Expr:
     """Return what P acts on, signed as ``b r - y`` (sections 2 and 8)."""
     weight = 1.0 if a.e_filter is not None else a.b
-    x: Expr = 0.0 - s.y if weight == 0 else _weighted(b, weight, "b", s)
-    if a.shape is not None and a.shape.on != "integral" and weight == 1:
-        x = s.shaped
-    elif a.shape is not None and a.shape.on != "integral":
-        x = blocks.shaped(b, b.let("x_P", x, "signal of P"), fresh, a.shape, "e_P")
+    shape = a.shape
+    x = _shaped_signal(b, shape if shape is not None and shape.on_proportional else None, s, fresh, weight, "b")
     if a.cascade_b is not None and s.cascade is not None:
-        other = 0.0 - s.y if a.cascade_b == 0 else _weighted(b, a.cascade_b, "b_cascade", s)
+        other = _shaped_signal(b, shape if shape is not None and shape.on_cascade else None, s, fresh, a.cascade_b, "b_cascade")
         x = b.let("x_P", select(s.cascade, other, x), "signal of P: another structure in cascade (section 6)")
     return x
 
 
+def _shaped_signal(b: Builder, shape: Shape | None, s: Signals, fresh: Expr, weight: float, name: str) -> Expr:
+    """Return ``weight*r - y``, shaped where the card shapes the error of P."""
+    if shape is not None and weight == 1:
+        return s.shaped
+    x: Expr = 0.0 - s.y if weight == 0 else _weighted(b, weight, name, s)
+    return x if shape is None else blocks.shaped(b, b.let(f"x_{name}", x, "signal of P"), fresh, shape, f"e_{name}")
+
+
 def _proportional(b: Builder, a: Algorithm, s: Signals, outside: bool, fresh: Expr) -> Expr:
-    gain = a.kp if outside else 1.0
-    shaped = a.shape is not None and a.shape.on != "integral"
-    if a.b == 0 and not shaped and (a.cascade_b is None or s.cascade is None):
-        return b.coefficient("minus_kp", -gain, "proportional gain on PV, signed for action", "%/%") * s.y
+    shaped = a.shape is not None and a.shape.on_proportional
+    if outside and a.b == 0 and not shaped and (a.cascade_b is None or s.cascade is None):
+        return b.coefficient("minus_kp", -a.kp, "proportional gain on PV, signed for action", "%/%") * s.y
     x = proportional_signal(b, a, s, fresh)
-    return x if not outside else b.coefficient("kp", gain, "proportional gain, signed for action", "%/%") * x
+    return b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%") * x if outside else x
 
 
 def _derivative(b: Builder, a: Algorithm, s: Signals, fresh: Expr, gain: float, h: float) -> Expr:

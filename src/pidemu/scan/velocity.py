@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, Shape
 from pidemu.card.models import Rule
+from pidemu.errors import ScanError
 from pidemu.scan import blocks, output
 from pidemu.scan.blocks import Builder
 from pidemu.scan.program import Expr, Name, equal, select
@@ -46,8 +47,9 @@ def _proportional(b: Builder, a: Algorithm, t: Terms) -> Expr:
     """Return the increment of P, from the signals' own increments where the structure depends on the mode."""
     if a.cascade_b is not None:
         return _of_the_mode(b, a, t, a.cascade_b)
-    P1 = b.state("P1", "proportional term at the last scan")
-    moved = b.let("dP", t.P - P1, "increment of the proportional term")
+    P1 = b.state("P1", "signal of P at the last scan")
+    kp = b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%")
+    moved = b.let("dP", kp * (t.P - P1), "increment of the proportional term")
     b.let("P1", t.P, "kept for the next scan")
     return moved
 
@@ -63,12 +65,32 @@ def _of_the_mode(b: Builder, a: Algorithm, t: Terms, in_cascade: float) -> Expr:
         other = b.coefficient("b_cascade", in_cascade, "setpoint weight in cascade", "-")
         weight = b.let("b_now", select(s.cascade, other, weight), "setpoint weight in this mode")
     kp = b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%")
-    moved = b.let(
-        "dP", kp * (weight * (s.r - r1) - (s.y - y1)), "increment of the proportional term, structure of the mode (section 6)"
-    )
+    if a.shape is None:
+        change: Expr = weight * (s.r - r1) - (s.y - y1)
+    else:
+        change = _shaped(b, a.shape, t, weight * s.r - s.y, "x_now") - _shaped(b, a.shape, t, weight * r1 - y1, "x_was")
+    moved = b.let("dP", kp * change, "increment of the proportional term, structure of the mode (section 6)")
     b.let("r_last", s.r, "kept for the next scan")
     b.let("y_last", s.y, "kept for the next scan")
     return moved
+
+
+def _shaped(b: Builder, shape: Shape, t: Terms, x: Expr, name: str) -> Expr:
+    """Return a signal of P as the mode shapes it.
+
+    Raises
+    ------
+    ScanError
+        The shape remembers a crossing of zero, which a change of structure has no meaning for.
+    """
+    if shape.zero_crossing:
+        raise ScanError("a zero-crossing gap is not defined for increments whose structure depends on the mode")
+    plain = b.let(name, x, "signal of P")
+    shaped = blocks.shaped(b, plain, t.fresh, shape, f"e_{name}")
+    here = shaped if shape.on_proportional else plain
+    if t.signals.cascade is None or shape.on_proportional == shape.on_cascade:
+        return here
+    return select(t.signals.cascade, shaped if shape.on_cascade else plain, here)
 
 
 def _integral(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:

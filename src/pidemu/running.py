@@ -1,0 +1,177 @@
+"""A program under way: its functions and states, and what becomes of the states when another program takes over."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import isnan, nan
+from typing import Any, Final
+
+import numpy as np
+
+from pidemu.algorithm import Algorithm
+from pidemu.errors import ScanError
+from pidemu.scan.program import Program
+from pidemu.targets.python import Compiled, compiled
+
+_REMEMBERED: Final = 64
+"""Programs kept for other scan intervals."""
+
+
+class Running:
+    """A program with its states.
+
+    Parameters
+    ----------
+    make : callable
+        From a scan interval [s] to the program; with ``at_rest=True`` to one whose first scan moves nothing.
+    interval : float
+        Nominal scan interval [s].
+
+    Attributes
+    ----------
+    program : Program
+        The program at the nominal interval.
+    compiled : Compiled
+        Its functions.
+    state : list of float
+        Its states, in its order and precision; this list is changed in place.
+    """
+
+    def __init__(self, make: Callable[..., Program], interval: float) -> None:
+        self.interval = interval
+        self.program = make(interval)
+        self.compiled: Compiled = compiled(self.program)
+        self.state: list[float] = list(self.compiled.initial)
+        self._make = make
+        self._places = {q.name: i for i, q in enumerate(self.program.states)}
+        self._others: dict[float, Compiled] = {}
+
+    def at(self, h: float) -> Compiled:
+        """Return the functions for another scan interval [s].
+
+        Raises
+        ------
+        ScanError
+            The algorithm has another structure there.
+        """
+        if h == self.interval:
+            return self.compiled
+        found = self._others.get(h)
+        if found is None:
+            if len(self._others) >= _REMEMBERED:
+                self._others.clear()
+            program = self._make(h)
+            if [q.name for q in program.states] != list(self._places):
+                raise ScanError(
+                    f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
+                )
+            found = self._others[h] = compiled(program, like=(self.program, self.compiled))
+        return found
+
+    def reset(self) -> None:
+        """Go back to before the first scan."""
+        self.state[:] = self.compiled.initial
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._places
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.state[self._places[name]])
+
+    def __setitem__(self, name: str, value: float) -> None:
+        """Set a state, in the program's precision."""
+        place = self._places[name]
+        self.state[place] = type(self.compiled.initial[place])(value)
+
+    def named(self) -> dict[str, float]:
+        """Return the states by name."""
+        return {name: float(self.state[place]) for name, place in self._places.items()}
+
+    def inputs(self, last: Mapping[str, float]) -> tuple[float, ...]:
+        """Return the program's inputs from signals by name; what is missing is no signal."""
+        return tuple(last.get(q.name, 0.0 if q.name == "feedforward" else nan) for q in self.program.inputs)
+
+    def quiet(self) -> contextlib.AbstractContextManager[Any]:
+        """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
+        return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
+
+    def would_be(self, last: Mapping[str, float], name: str = "u") -> float:
+        """Return what the next scan would compute under a name; nothing changes."""
+        functions = self.compiled if name == "u" else compiled(replace(self.program, output=name))
+        with self.quiet():
+            return float(functions.scan(list(self.state), *self.inputs(last)))
+
+    def computes(self, name: str) -> bool:
+        """Tell whether the program computes something under a name."""
+        return any(assign.name == name for assign in self.program.body)
+
+    def take_over(self, old: Mapping[str, float], last: Mapping[str, float]) -> None:
+        """Take over the states of the program before, by name.
+
+        States that it did not have start at rest, from the last signals; an integral that it did not have starts where the output
+        stays.
+
+        Parameters
+        ----------
+        old : mapping
+            States by name.
+        last : mapping
+            The last signals by name; empty before the first scan.
+        """
+        new = [name for name in self._places if name not in old]
+        for name in self._places.keys() & old.keys():
+            self[name] = old[name]
+        if not last or not new:
+            return
+        rest = self._resting(last, old["u"])
+        rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
+        for name in new:
+            self[name] = rest.get(name, self[name])
+        if "I" in new:
+            self["I"] = self._left_for_the_integral(last, old["u"])
+
+    def _by_hand(self, last: Mapping[str, float], u: float) -> dict[str, float]:
+        return {**last, "auto": 0.0, "manual": u, "track": nan}
+
+    def _resting(self, last: Mapping[str, float], u: float) -> dict[str, float]:
+        """Return the states of a controller that has had the last signals for ever, in manual."""
+        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        with other.quiet():
+            other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
+        return other.named()
+
+    def _left_for_the_integral(self, last: Mapping[str, float], u: float) -> float:
+        """Return the integral with which the output stays where it is."""
+        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        for name in other.named().keys() & self.named().keys():
+            other[name] = self[name]
+        for name in {"on", "begun"} & other.named().keys():
+            other[name] = float(name == "begun")
+        with other.quiet():
+            other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
+        return other["I"]
+
+    def keep_output(self, old: Running, last: Mapping[str, float]) -> None:
+        """Move the integral by what the proportional term becomes less, at the last signals: the listing's parameter change."""
+        if "I" in self and old.computes("P") and self.computes("P"):
+            moved = old.would_be(last, "P") - self.would_be(last, "P")
+            if not isnan(moved):
+                self["I"] += moved
+
+
+def resting(a: Algorithm) -> Algorithm:
+    """Return the algorithm with a first scan that moves nothing and a transfer that does not bump."""
+    return replace(
+        a,
+        start="bumpless",
+        first_scan_holds=False,
+        zero_power_up=False,
+        zero_first_output=False,
+        derivative_start="running",
+        derivative_from_zero=False,
+        integral_from_zero=False,
+        sp_from_zero=False,
+        manual_output="operator",
+    )
