@@ -221,7 +221,10 @@ class Controller:
             raise ScanError(f"the controller runs {old.card.id}; settings of {new.card.id} need a controller of their own")
         before, after = self._running, self._running_with(new)
         last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
-        after.take_over(before.named(), last)
+        weights = (old.algorithm().c, new.algorithm().c)
+        other_signal = weights[0] != weights[1]  # what the derivative remembers is another signal's
+        kept = {n: x for n, x in before.named().items() if not (other_signal and n in ("x1", "x2", "x3"))}
+        after.take_over(kept, last)
         if last:
             if new.algorithm().bumpless_changes and self._mode in ("automatic", "cascade"):
                 after.keep_output(before, last)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,10 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.card import schema
+from pidemu.card import models, schema
+from pidemu.card.load import card_from
+from pidemu.card.source import parse
+from pidemu.errors import CardError
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -20,6 +24,16 @@ def validator() -> Any:
     found = json.loads((SPECS / "card.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(found)
     return jsonschema.Draft202012Validator(found)
+
+
+def changed(card_id: str, path: tuple[str, ...], value: Any) -> Any:
+    """A card with one field set; sections that it does not have are added."""
+    card = plain(card_id)
+    here = card
+    for step in path[:-1]:
+        here = here.setdefault(step, {})
+    here[path[-1]] = value
+    return card
 
 
 def plain(card_id: str) -> Any:
@@ -45,26 +59,84 @@ def test_every_card_obeys_the_schema(card_id: str, validator: Any) -> None:
     assert [] == [e.message for e in validator.iter_errors(plain(card_id))]
 
 
+WINDUP = ("integral", "windup")
+CHOICE = ("options", "FORM", "choices", "Series")
+
+
 @pytest.mark.parametrize(
     ("path", "value"),
     [
         (("form",), "seires"),
         (("derivative", "filter", "order"), 3),
-        (("integral", "windup"), {"scheme": "clamp", "tracking-time": 3}),
-        (("integral", "windup"), {"scheme": "back-calculation"}),
-        (("integral", "windup"), {"scheme": "sometimes"}),
-        (("options", "FORM", "choices", "Series", "form"), "standrad"),
-        (("options", "FORM", "choices", "Series", "settings"), {"GAIN": {"unti": "%"}}),
+        (WINDUP, {"scheme": "clamp", "tracking-time": 3}),
+        (WINDUP, {"scheme": "back-calculation"}),
+        (WINDUP, {"scheme": "sometimes"}),
+        (WINDUP, {"scheme": "recompute", "tracking-time": "Ti"}),
+        (WINDUP, {"scheme": "recompute", "without-derivative": "yes"}),
+        (WINDUP, {"scheme": "reset-outside-band", "fast-return": 16}),
+        (WINDUP, {"scheme": "external-reset", "fast-return": 0.5}),
+        (WINDUP, {"scheme": "freeze", "judged-on": "the sum"}),
+        (WINDUP, {"scheme": "velocity", "clamped": True}),
+        (("integral", "holds"), "ki"),
+        (("integral", "limits"), {"low": 0}),
+        (("integral", "rule"), "four-point"),
+        (("derivative", "rule"), "tustin"),
+        (("measurement", "filter"), {"tiem": 3}),
+        (("measurement", "filter"), {"time": 3, "rule": "exact"}),
+        (("error", "shape"), "cubed"),
+        (("error", "over"), 0),
+        (("cascade",), {}),
+        (("feedforward", "summed"), "at the limits"),
+        (("arithmetic",), {"type": "float16"}),
+        (("arithmetic",), {"type": "integer", "counts": 0.5}),
+        (("faults", "signal"), "ignore"),
+        (("transfer", "start"), "smooth"),
+        (("action", "fixed"), "yes"),
+        (("settings", "GAIN", "sets"), "process"),
+        ((*CHOICE, "form"), "standrad"),
+        ((*CHOICE, "settings"), {"GAIN": {"unti": "%"}}),
+        ((*CHOICE, "integral"), {"windup": {"scheme": "recompute", "implicit": True}}),
+        ((*CHOICE, "integral"), {"windup": {"scheme": "reset-outside-band", "clamped": True}}),
+        ((*CHOICE, "error"), {"shap": "gap"}),
         (("unknown",), 1),
     ],
+    ids=str,
 )
 def test_the_schema_refuses_what_the_loader_refuses(path: tuple[str, ...], value: Any, validator: Any) -> None:
-    card = plain("emerson/deltav")
-    here = card
-    for step in path[:-1]:
-        here = here[step]
-    here[path[-1]] = value
+    card = changed("emerson/deltav", path, value)
     assert list(validator.iter_errors(card)) != []
+    with pytest.raises(CardError):
+        card_from(parse(json.dumps(card), "deltav.yaml"), "emerson/deltav")
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (WINDUP, {"scheme": "recompute"}),
+        (WINDUP, {"scheme": "recompute", "without-derivative": True, "clamped": True}),
+        (WINDUP, {"scheme": "reset-outside-band"}),
+        (WINDUP, {"scheme": "external-reset", "fast-return": 16}),
+        (WINDUP, {"scheme": "freeze", "judged-on": "sum", "direction": "both"}),
+        (WINDUP, {"scheme": "back-calculation", "tracking-time": 0.5, "times": "Ti", "implicit": True}),
+        (("integral", "limits"), {"low": "output", "high": "GAIN"}),
+        (("integral", "limits"), {"low": "-inf", "high": 3}),
+        (("derivative", "rule"), "four-point"),
+        (("measurement",), {"filter": {"factor": 0.5}, "previous-scan": True}),
+        (("error",), {"shape": "gap", "band": 2, "zero-crossing": True}),
+        (("cascade", "proportional"), {"on": "pv"}),
+        (("faults",), {"signal": "nan", "negative-interval": "refuse"}),
+        ((*CHOICE, "integral"), {"windup": {"scheme": "recompute", "clamped": True}}),
+        ((*CHOICE, "integral"), {"windup": {"scheme": "reset-outside-band"}, "limits": {"high": "output"}}),
+        ((*CHOICE, "measurement"), {"filter": {"time": 3}}),
+        ((*CHOICE, "error"), None),
+        ((*CHOICE, "arithmetic"), {"type": "float32"}),
+    ],
+    ids=str,
+)
+def test_the_schema_takes_what_the_loader_takes(path: tuple[str, ...], value: Any, validator: Any) -> None:
+    card = changed("emerson/deltav", path, value)
+    assert [] == [e.message for e in validator.iter_errors(card)]
+    card_from(parse(json.dumps(card), "deltav.yaml"), "emerson/deltav")
 
 
 def test_no_union_is_left_that_an_editor_would_ignore() -> None:
@@ -77,3 +149,18 @@ def test_every_field_of_the_language_has_a_description() -> None:
     for line in schema.reference().splitlines():
         if line.startswith("| `"):
             assert line.rstrip("| ").split("|")[-1].strip() not in ("", "None"), line
+
+
+def test_every_line_of_the_reference_s_tables_has_four_cells() -> None:
+    lines = [line for line in schema.reference().splitlines() if line.startswith("|")]
+    assert [line for line in lines if line.replace("\\|", "").count("|") != 5] == []
+
+
+def test_every_part_of_the_language_is_in_the_reference() -> None:
+    headings = {
+        line.removeprefix("### ").lower().replace(" ", "-") for line in schema.reference().splitlines() if line[:3] == "###"
+    }
+    linked = set(re.findall(r"\(#([a-z-]+)\)", schema.reference()))
+    assert linked <= headings
+    parts = {name.lower() for name, c in vars(models).items() if isinstance(c, type) and issubclass(c, models.Model)}
+    assert parts - {"model"} == {heading.replace("-", "") for heading in headings - {"card"} | {"cardfile"}}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from pidemu.card.load import Card, load_file
+from pidemu.card.load import Card, load_file, variants
 from pidemu.checks import check_file
 from pidemu.errors import Problem
 
@@ -64,6 +65,46 @@ ALPHA = '  ALPHA: {sets: filter-ratio, unit: "1", range: [0.05, 1], default: 0.1
 ALPHA_EVIDENCE = "  settings.ALPHA.default: {status: documented, source: manual, at: p. 5}\n"
 
 Edit = tuple[str, str]
+Case = tuple[str, tuple[Edit, ...], tuple[str, ...]]
+"""A rule's name, edits that break it, and what is said of the result."""
+
+VELOCITY: tuple[Edit, ...] = (("implementation: positional", "implementation: velocity"), (WINDUP, "{scheme: velocity}"))
+"""Edits that make the card's implementation velocity."""
+_DIALS = VALID[VALID.index("settings:\n") : VALID.index("options:")]
+_PROCESS = """\
+settings:
+  GAIN: {sets: process-gain, unit: "%/%"}
+  TIME: {sets: process-time, unit: s}
+  LAMBDA: {sets: closed-loop-time, unit: s}
+"""
+_EXAMPLE = VALID[VALID.index("  - given") :]
+DAHLIN: tuple[Edit, ...] = (
+    *VELOCITY,
+    ("form: standard", "form: dahlin"),
+    ("proportional: {on: error}", "proportional: {on: none}"),
+    ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
+    (_DIALS, _PROCESS),
+    (ALPHA_EVIDENCE, ""),
+    (CHOICE, "{}"),
+    (_EXAMPLE, "  - given: {GAIN: 2, TIME: 10, LAMBDA: 10}\n    outputs: [0.5, 0.547581]\n"),
+)
+"""Edits that make the card a pole-cancellation algorithm."""
+
+
+def added(field: str, value: str, *, line: int = 9) -> tuple[Edit, ...]:
+    """Return edits that add a field to the card, on line 9 or 8, with its evidence at the end of the other."""
+    before = {9: "proportional: {on: error}", 8: "implementation: "}[line]
+    evidence = {9: "  proportional: {status", 8: "  implementation: {status"}[line]
+    return (
+        (f"\n{before}", f"\n{field}: {value}\n{before}"),
+        (f"\n{evidence}", f"\n  {field}: {{status: assumed, note: so}}\n{evidence}"),
+    )
+
+
+def found_by(rules: Iterable[Callable[..., Iterable[Problem]]], name: str, folder: Path, text: str) -> set[str]:
+    """Return what one rule finds in any combination of a card's options."""
+    [rule] = [r for r in rules if r.__name__ == name]
+    return {headline for variant in variants(loaded(folder, text)) for headline in headlines(list(rule(variant)))}
 
 
 def edited(text: str, *edits: Edit) -> str:

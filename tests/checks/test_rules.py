@@ -8,16 +8,28 @@ from typing import Any
 
 import pytest
 
-from pidemu.card.load import Card, variants
-from pidemu.checks import equations, runs, statements
+from pidemu.checks import equations, runs, stages, statements
 from pidemu.errors import Problem
-from tests.checks.bench import ALPHA, ALPHA_EVIDENCE, CHOICE, GAIN, VALID, WINDUP, Edit, edited, faults, headlines, loaded
+from tests.checks.bench import (
+    ALPHA,
+    ALPHA_EVIDENCE,
+    CHOICE,
+    DAHLIN,
+    GAIN,
+    VALID,
+    WINDUP,
+    Case,
+    Edit,
+    added,
+    edited,
+    faults,
+    found_by,
+    headlines,
+    loaded,
+)  # fmt: skip
 
-Case = tuple[str, tuple[Edit, ...], tuple[str, ...]]
-
-_UNITS = (
-    "1, %/%, %, eu, eu/eu, %/eu, ms, ms/repeat, repeat/ms, 1/ms, s, s/repeat, repeat/s, 1/s, "
-    "min, min/repeat, repeat/min, 1/min, h, h/repeat, repeat/h, 1/h"
+_UNITS = "1, %/%, %, eu, eu/eu, %/eu, Hz, " + ", ".join(
+    f"{time}, {time}/repeat, repeat/{time}, 1/{time}, %/{time}, eu/{time}" for time in ("ms", "s", "min", "h")
 )
 _ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero"
 _FILTER_GAIN: tuple[Edit, ...] = (
@@ -179,7 +191,7 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_references",
         (("ratio: ALPHA", "ratio: RATE"),),
-        ("11:56: 'RATE' sets the derivative, here a filter-ratio is needed", "17:3: nothing uses 'ALPHA'"),
+        ("11:56: 'RATE' sets the derivative; here one that sets the filter-ratio is needed", "17:3: nothing uses 'ALPHA'"),
     ),
     ("reject_bad_references", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
     (
@@ -191,6 +203,86 @@ EQUATIONS: tuple[Case, ...] = (
         "reject_bad_references",
         ((CHOICE, "{proportional: {on: weighted, weight: BETA}}"),),
         ("23:51: no setting 'BETA'",),
+    ),
+    (
+        "reject_missing_dials",
+        (("GAIN: {sets: gain,", "GAIN: {sets: process-gain,"),),
+        (
+            "13:1: no setting sets the gain",
+            "14:3: 'GAIN' sets the process-gain, which form 'standard' does not have; remove it",
+        ),
+    ),
+    (
+        "reject_missing_dials",
+        (*DAHLIN, ("  LAMBDA: {sets: closed-loop-time,", "  LAMBDA: {sets: integral,")),
+        (
+            "13:1: no setting sets the closed-loop-time",
+            "16:3: 'LAMBDA' sets the integral, which form 'dahlin' does not have; remove it",
+        ),
+    ),
+    (
+        "reject_missing_dials",
+        ((ALPHA, ALPHA + '  K: {sets: multiplier, unit: "1", default: 1}\n  K2: {sets: multiplier, unit: "1", default: 1}\n'),),
+        ("19:3: 'K' and 'K2' both set the multiplier",),
+    ),
+    (
+        "reject_bad_references",
+        ((WINDUP, "{scheme: none}, limits: {high: IMAX}"), (ALPHA, ALPHA + "  IMAX: {sets: deadband, unit: '%'}\n")),
+        ("10:78: 'IMAX' sets the deadband; here one that sets the integral-limit is needed",),
+    ),
+    (
+        "reject_bad_references",
+        added("measurement", "{filter: {time: TPV}}"),
+        ("9:30: no setting 'TPV'",),
+    ),
+    ("reject_bad_references", added("setpoint", "{filter: {time: -3}}"), ("9:27: time is -3; it is a number from 0 up",)),
+    (
+        "reject_bad_references",
+        added("setpoint", "{rate: 0}"),
+        ("9:18: rate is 0: nothing would ever move; give a number above 0",),
+    ),
+    (
+        "reject_bad_references",
+        ((WINDUP, "{scheme: none}, limits: {low: .nan, high: output}"),),
+        ("10:77: low is nan; it is a number",),
+    ),
+    (
+        "reject_bad_references",
+        added("error", "{shape: gap, band: -1, gain: -0.5}"),
+        ("9:27: band is -1; it is a number from 0 up", "9:37: gain is -0.5; it is a number from 0 up"),
+    ),
+    (
+        "reject_bad_references",
+        (("output: {limits: [0, 100]}", "output: {limits: [0, 100], rate: OUT_RATE, deadband: GAIN, resolution: STEP}"),),
+        (
+            "28:34: no setting 'OUT_RATE' (did you mean 'RATE'?)",
+            "28:54: 'GAIN' sets the gain; here one that sets the deadband is needed",
+            "28:72: no setting 'STEP'",
+        ),
+    ),
+    (
+        "reject_bad_references",
+        added("feedforward", "{summed: before-limits, gain: KFF}"),
+        ("9:44: no setting 'KFF'",),
+    ),
+    (
+        "reject_bad_references",
+        added("cascade", "{proportional: {on: weighted, weight: BETA}}"),
+        ("9:48: no setting 'BETA'",),
+    ),
+    (
+        "reject_bad_references",
+        (
+            ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
+            *_NO_ALPHA,
+            ("kd: 32, Tf: 2}", "kd: 0}"),
+        ),
+        ("16:3: nothing uses 'RATE'",),
+    ),
+    (
+        "reject_bad_weights",
+        added("cascade", "{proportional: {on: weighted}}"),
+        ("9:26: 'on: weighted' needs 'weight'",),
     ),
     (
         "reject_bad_weights",
@@ -232,6 +324,11 @@ EQUATIONS: tuple[Case, ...] = (
         "reject_bad_filter",
         ((CHOICE, "{derivative: {filter: {applies-to: lead-lag, ratio: 0.1}}}"),),
         ("23:27: a lead-lag belongs to the series form, this is 'standard'",),
+    ),
+    (
+        "reject_bad_filter",
+        (("applies-to: term", "applies-to: term, rule: trapezoidal"),),
+        ("11:55: 'rule' here is that of a filter on measurement or output; the term's is 'derivative.rule'",),
     ),
     (
         "reject_bad_windup",
@@ -323,7 +420,35 @@ RUNS: tuple[Case, ...] = (
     (
         "reject_wrong_examples",
         (("applies-to: term", "applies-to: measurement, order: 2"),),
-        ("45:5: a second-order filter has no parallel gains; choose settings without it",),
+        ("45:5: two filters, or one of second order, have no parallel gains; choose settings without, or state 'outputs'",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("    canonical: {kp: 2, ki: 0.0333333, kd: 32, Tf: 2}\n", ""),),
+        ("45:5: an example needs 'canonical' or 'outputs', or both",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("    canonical: {kp: 2, ki: 0.0333333, kd: 32, Tf: 2}\n", "    outputs: []\n"),),
+        ("45:5: an example needs 'canonical' or 'outputs', or both",),
+    ),
+    (
+        "reject_wrong_examples",
+        (("    canonical: {kp: 2,", "    outputs: [2.033333, 2.07, 2.1]\n    canonical: {kp: 2,"),),
+        ("46:25: output 2 is 2.07, the settings amount to 2.06667",),
+    ),
+    (
+        "reject_wrong_examples",
+        (*added("measurement", "{filter: {time: 3}}"),),
+        ("47:5: two filters, or one of second order, have no parallel gains; choose settings without, or state 'outputs'",),
+    ),
+    (
+        "reject_wrong_examples",
+        (*DAHLIN, ("    outputs: [0.5, 0.547581]\n", "    canonical: {kp: 0.5, ki: 0.05, kd: 0}\n")),
+        (
+            "44:5: pole cancellation for a dead time of 0 s is a recursion in scans and has no continuous law; "
+            "state 'outputs' instead",
+        ),
     ),
     (
         "reject_unrunnable",
@@ -334,7 +459,7 @@ RUNS: tuple[Case, ...] = (
 
 _ROOMS: dict[str, tuple[Iterable[Callable[..., Iterable[Problem]]], tuple[Case, ...]]] = {
     "statements": (statements.RULES, STATEMENTS),
-    "equations": (equations.RULES, EQUATIONS),
+    "equations": ([rule for rule in equations.RULES if rule not in stages.RULES], EQUATIONS),
     "runs": (runs.RULES, RUNS),
 }
 
@@ -358,13 +483,14 @@ def test_a_card_that_breaks_a_rule_is_refused_at_its_place(
 ) -> None:
     text = edited(VALID, *edits)
     assert list(expected) == headlines(faults(tmp_path, text))
-    assert set() < _found_by(room, rule, loaded(tmp_path, text)) <= set(expected)
+    assert set() < _found_by(room, rule, tmp_path, text) <= set(expected)
 
 
-def _found_by(room: str, name: str, card: Card) -> set[str]:
+def _found_by(room: str, name: str, folder: Path, text: str) -> set[str]:
+    if room == "equations":
+        return found_by(_ROOMS[room][0], name, folder, text)
     [rule] = [r for r in _ROOMS[room][0] if r.__name__ == name]
-    subjects = list(variants(card)) if room == "equations" else [card]
-    return {headline for subject in subjects for headline in headlines(list(rule(subject)))}
+    return set(headlines(list(rule(loaded(folder, text)))))
 
 
 def test_faults_of_two_rules_come_in_the_order_of_the_file(tmp_path: Path) -> None:

@@ -11,10 +11,15 @@ from pidemu.checks import check_file
 from tests.checks.bench import CHOICE, VALID, WINDUP, Edit, edited, faults, headlines
 
 _SETS = (
-    "'gain', 'multiplier', 'integral', 'derivative', 'filter-time', 'filter-ratio', 'filter-gain', "
-    "'proportional-weight', 'derivative-weight' or 'tracking-time'"
+    "'gain', 'multiplier', 'integral', 'derivative', 'filter-time', 'filter-ratio', 'filter-gain', 'proportional-weight', "
+    "'derivative-weight', 'tracking-time', 'filter-factor', 'integral-limit', 'deadband', 'gap-gain', 'linearity', "
+    "'feedforward-gain', 'bias', 'output-rate', 'setpoint-rate', 'resolution', 'process-gain', 'process-time', 'process-delay' "
+    "or 'closed-loop-time'"
 )
-_SCHEMES = "'none', 'clamp', 'clamp-sum', 'freeze', 'conditional', 'back-calculation', 'external-reset', 'velocity'"
+_SCHEMES = (
+    "'none', 'clamp', 'clamp-sum', 'freeze', 'conditional', 'recompute', 'back-calculation', 'external-reset', 'velocity', "
+    "'reset-outside-band'"
+)
 _NAME = "is not a name: letters, digits and underscores, starting with a letter"
 _WORDS = "'error', 'pv', 'weighted' or 'none'"
 
@@ -154,7 +159,7 @@ WRONG_WORDS: dict[str, Case] = {
     ),
     "form": (
         ("form: standard", "form: serial"),
-        ("7:7: 'serial' is not one of 'parallel', 'standard' or 'series' (did you mean 'series'?)",),
+        ("7:7: 'serial' is not one of 'parallel', 'standard', 'series' or 'dahlin' (did you mean 'series'?)",),
     ),
     "upper case": (
         ("derivative: {on: pv", "derivative: {on: PV"),

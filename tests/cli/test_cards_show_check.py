@@ -56,7 +56,8 @@ def test_a_broken_card_is_named_and_the_others_are_listed(folder: Path) -> None:
     assert status == 1
     assert len(out.splitlines()) == 1 + len(pidemu.cards())
     assert err == (
-        f"error: nobody/bench: {file}:7:7: 'serial' is not one of 'parallel', 'standard' or 'series' (did you mean 'series'?)\n"
+        f"error: nobody/bench: {file}:7:7: 'serial' is not one of 'parallel', 'standard', 'series' or 'dahlin' "
+        "(did you mean 'series'?)\n"
     )
 
 
@@ -65,7 +66,11 @@ def test_show_prints_every_card_with_every_choice_of_options(card_id: str, optio
     words = [f"{name}={choice}" for name, choice in options.items()]
     text = told("show", card_id, *words)
     assert text.startswith(f"{card_id}   {pidemu.load_card(card_id).title}\n")
-    assert [h for h in ("Equation", "Scan by scan", "Settings", "Evidence", "Sources", "Examples") if f"\n{h}" not in text] == []
+    assert [
+        h
+        for h in ("Equation", "Scan by scan", "At the limits", "Modes and signals", "Settings", "Evidence", "Sources", "Examples")
+        if f"\n{h}" not in text
+    ] == []
     shown = strict_json(told("show", card_id, *words, "--json"))
     assert (card_id, options) == (shown["card"], shown["options"])
 
@@ -75,6 +80,104 @@ def test_show_prints_equation_settings_and_their_evidence() -> None:
     assert ["RESET", "integral", "repeat/min", "required", "0", "reset", "rate"] in lines
     assert ["form", "documented", "[beall]", "PROVOX", "PID", "algorithm:", "series"] in lines
     assert "OUT = K [ (SP - L PV) + 1/(Ti s) (SP - L PV) ]" in told("show", "fisher/provox")
+
+
+def _section(text: str, title: str) -> list[str]:
+    """The lines of a section of the data sheet, each with single blanks."""
+    [part] = [part for part in text.split("\n\n") if part.startswith(title)]
+    return [" ".join(line.split()) for line in part.splitlines()[1:]]
+
+
+def test_show_prints_a_data_sheet() -> None:
+    text = told("show", "iec/61131-3-pid")
+    assert _section(text, "Equation") == [
+        "OUT = K [ (PV - SP) + 1/(Ti s) (PV - SP) + Td s (PV - SP) ]",
+        "K = KP [eu/eu]",
+        "Ti = TR [s]",
+        "Td = TD [s]",
+    ]
+    assert _section(text, "Scan by scan") == [
+        "form standard",
+        "implementation positional: the output is the sum of the terms",
+        "integral backward: this scan's error counts at once; the sum is that of e, gain and integral time are",
+        "applied afterwards",
+        "derivative four-point difference, over three scans",
+        "signals engineering units",
+        "scan interval 100 ms unless given; uneven scans are computed as if they were even",
+        "arithmetic float32, rounded after every operation; operations with a number of the program text are",
+        "float64",
+    ]
+    assert _section(text, "At the limits") == ["output limits none unless given", "at a limit none: the integral goes on"]
+    assert _section(text, "Modes and signals") == [
+        "action none to choose: the error is PV - SP, so a positive gain is direct acting; reverse is",
+        "called 'negative KP', direct 'positive KP'",
+        "in manual the output is the operator's number times the gain; the integral follows it; D is 0 and",
+        "starts from the present signal",
+        "to automatic the integral goes on from where it followed the output",
+        "at power-up the integral starts at zero, whatever the output was; D starts from a signal of zero: a",
+        "kick",
+        "changed settings leave the integral of e as it is; a changed gain or integral time moves the whole sum",
+        "NaN, infinity in SP or PV: they are computed with",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "section", "line"),
+    [
+        (("yokogawa/fieldbus-pid",), "Equation", "PVf = PV/(1 + Tpv s)"),
+        (("yokogawa/fieldbus-pid",), "At the limits", "at a limit velocity: increments start from the limited output"),
+        (("ardupilot/ac-pid",), "Equation", "E = (SPf - PV)/(1 + Te s)"),
+        (("ardupilot/ac-pid",), "Equation", "Tf = 1/(2 pi FLTD), FLTD [Hz]"),
+        (("ardupilot/ac-pid",), "Scan by scan", "filters setpoint backward, error backward"),
+        (("ardupilot/ac-pid",), "At the limits", "integral limits -IMAX [eu] to IMAX [eu]"),
+        (("ardupilot/ac-pid",), "Modes and signals", "NaN, infinity in SP or PV: the output is 0 and nothing is computed"),
+        (("automationdirect/directlogic", "ERROR_TERM=DEADBAND"), "Equation", "S(x) = 0 while |x| < DEADBAND [%]; else x"),
+        (
+            ("automationdirect/directlogic",),
+            "Modes and signals",
+            "setpoint follows PV in manual, and stays there until it is changed",
+        ),
+        (("epics/epid",), "At the limits", "output deadband the output moves only by more than ODEL [eu]"),
+        (("epics/epid",), "At the limits", "integral limits those of the output"),
+        (("foxboro/ia-pid",), "Scan by scan", "filters measurement backward, second order"),
+        (("foxboro/pneumatic",), "Equation", "OUT = K [ L (SP - PV) + 1/(Ti s) L (SP - PV) ]"),
+        (("modelica/limpid",), "At the limits", "feedforward FF is added to the sum, before the limits"),
+        (("modelica/limpid", "controllerType=P"), "Equation", "OUT = K [ (b SP - PV) ] + bias + kFF FF"),
+        (("ni/pid", "ALGORITHM=precise"), "Equation", "S(x) = x (LINEARITY + (1 - LINEARITY) |x|/100)"),
+        (("ros/control-toolbox",), "Modes and signals", "in manual the output is 0; the integral is 0"),
+        (("toshiba/pid3",), "Scan by scan", "arithmetic integer: 100 counts per percent, 100 per unit of gain, remainders carried"),
+        (("generic/dahlin",), "Equation", "N = theta/h, rounded to whole scans"),
+        (("generic/dahlin",), "At the limits", "at a limit the recursion goes on from the limited outputs"),
+        (("honeywell/tdc3000",), "Modes and signals", "to automatic bumpless: the first scan makes no increment"),
+    ],
+)
+def test_show_says_what_a_card_does(words: tuple[str, ...], section: str, line: str) -> None:
+    assert [found for found in _section(told("show", *words), section) if found.startswith(line)] != []
+
+
+def test_show_states_what_the_card_leaves_open_as_such() -> None:
+    assert "NaN, infinity in SP or PV, as the card does not say: the output is held and nothing is computed" in _section(
+        told("show", "fisher/provox"), "Modes and signals"
+    )
+
+
+def test_show_prints_gains_and_outputs_of_the_examples() -> None:
+    assert _section(told("show", "yokogawa/fieldbus-pid"), "Examples") == [
+        "- GAIN=2, RESET=20, RATE=5: kp 2, ki 0.1 1/s, kd 10 s",
+        "- GAIN=2, RESET=20, RATE=5: after a setpoint step of 1 the output has moved by 0.1, 0.2, 0.3, scan by scan",
+        "(in automatic a setpoint step is answered by integral action alone)",
+    ]
+
+
+def test_show_keeps_within_the_width_of_a_page() -> None:
+    for card_id in pidemu.cards():
+        assert [line for line in told("show", card_id).splitlines()[1:] if len(line) > 120] == []
+
+
+def test_show_as_json_holds_the_behaviour() -> None:
+    behaviour = strict_json(told("show", "gnc-tools/cpid", "--json"))["behaviour"]
+    assert behaviour["to automatic"] == "the algorithm takes over as it ran: a bump"
+    assert behaviour["integral"] == "forward: this scan's error counts from the next scan on"
 
 
 def test_show_marks_a_dial_that_the_options_leave_unused() -> None:

@@ -249,7 +249,8 @@ def test_a_broken_card_is_refused_at_its_place_with_status_1(line: str, folder: 
     assert said(*words(line)) == Said(
         1,
         "",
-        "error: nobody/bench.yaml:7:7: 'serial' is not one of 'parallel', 'standard' or 'series' (did you mean 'series'?)\n"
+        "error: nobody/bench.yaml:7:7: 'serial' is not one of 'parallel', 'standard', 'series' or 'dahlin' "
+        "(did you mean 'series'?)\n"
         "  6 |   manual: {title: Bench manual, read: 2026-01-02}\n"
         "  7 | form: serial\n"
         "    |       ^^^^^^\n"

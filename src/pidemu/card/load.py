@@ -18,6 +18,8 @@ from pidemu.errors import CardError, Problem, SettingError, suggest
 if TYPE_CHECKING:
     from pidemu.settings import Settings
 
+EMULATION = "emulation"
+"""Evidence key for how the emulation was verified; it leads to no field."""
 _REPLACED_WHOLE = ("filter", "windup")
 _SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
 _SCAN_BY_SCAN_KEYS = ("rule", "windup", "holds", "limits", "deadband", "rate", "starts", "tracks", "previous-scan")

@@ -138,21 +138,28 @@ class SignalFilter(Model):
     """A first-order filter on a signal before the algorithm, `1/(1 + Tf s)`."""
 
     time: Reference | None = Field(
-        default=None, description="Filter time: seconds, or the name of a setting. Exactly one of `time` and `factor`."
+        default=None,
+        description="Filter time Tf: seconds, or the name of a setting, which may be a corner frequency in Hz. "
+        "Exactly one of `time` and `factor`.",
     )
     factor: Reference | None = Field(
         default=None,
-        description="Share k of the new sample per scan, `f += k (x - f)`, from above 0 to 1 (no filter): a number, or the name "
-        "of a setting. The filter time goes with the scan interval, `Tf = h (1 - k)/k`.",
+        description="In place of a time: the share k of the new sample per scan, `f += k (x - f)`, from above 0 to 1 (no filter); "
+        "a number, or the name of a setting. The filter time goes with the scan interval, `Tf = h (1 - k)/k`.",
     )
-    rule: GeneralRule = Field(default=Rule.BACKWARD, description="Scan rule.")
+    rule: GeneralRule = Field(
+        default=Rule.BACKWARD,
+        description="How the filter is computed (specs/equations.md, section 4). A `factor` is the backward rule.",
+    )
 
 
 class Measurement(Model):
     """What is done to the measurement before the algorithm."""
 
     filter: SignalFilter | None = Field(default=None, description="Filter on the measurement; P, I and D see what it lets through.")
-    previous_scan: Flag = Field(default=False, description="Whether the algorithm uses the measurement of the previous scan.")
+    previous_scan: Flag = Field(
+        default=False, description="Whether the algorithm uses the measurement of the previous scan: one scan more of dead time."
+    )
 
 
 class Setpoint(Model):
@@ -160,7 +167,9 @@ class Setpoint(Model):
 
     filter: SignalFilter | None = Field(default=None, description="Filter on the setpoint.")
     rate: Reference | None = Field(
-        default=None, description="Fastest change of the setpoint that the algorithm sees: per second, or the name of a setting."
+        default=None,
+        description="Fastest change of the setpoint that the algorithm sees [as the measurement, per second]: a "
+        "number, or the name of a setting.",
     )
     starts: Literal["setpoint", "zero"] = Field(
         default="setpoint", description="Where the limited setpoint starts at power-up: at the setpoint, or at zero."
@@ -190,7 +199,8 @@ class ErrorShape(Model):
         description="With `gap`: outside the band the error is less by what the band took, so that nothing jumps at its edge.",
     )
     zero_crossing: Flag = Field(
-        default=False, description="With `gap`: the band counts only after the error has changed its sign within it."
+        default=False,
+        description="With `gap`: the band counts only after the error has changed its sign within it, until the error leaves it.",
     )
     edge: Literal["inside", "outside"] = Field(
         default="inside", description="With `gap`: whether an error of exactly the band is inside it."
@@ -200,7 +210,8 @@ class ErrorShape(Model):
         default=100.0, description="The |e| at which `squared` and `gain-linear` have gain 1 [as the measurement]."
     )
     on: Literal["error", "proportional", "integral"] = Field(
-        default="error", description="What is shaped: the error of P and I alike, or of one of them."
+        default="error",
+        description="Which terms the shape counts for: P and I alike, or one of them. The derivative never sees it.",
     )
 
 
@@ -357,11 +368,14 @@ class Integral(Model):
     )
     holds: Literal["ki e", "e/Ti", "e"] = Field(
         default="ki e",
-        description="What the state is the integral of: `ki e`, so that a changed setting does not bump; `e/Ti`, the gain applied "
-        "afterwards; or `e`, gain and integral time applied afterwards (specs/equations.md, section 6).",
+        description="What the integral remembers. The sum of `ki e`: a changed gain or integral time counts for what is still to "
+        "come. The sum of `e/Ti`, multiplied by the gain afterwards, or of `e`, multiplied by gain and 1/Ti afterwards: a change "
+        "counts for the whole sum, and bumps (specs/equations.md, section 6).",
     )
     limits: IntegralLimits | None = Field(
-        default=None, description="Limits of the state, in the units of what it holds, besides what `windup` does."
+        default=None,
+        description="Limits of what the integral remembers, besides what `windup` does: in output units for `ki e`, "
+        "otherwise before the gain.",
     )
     starts: Literal["sample", "zero"] = Field(
         default="sample",
@@ -431,7 +445,9 @@ class Derivative(Model):
 class Cascade(Model):
     """What is different in cascade, with a remote setpoint."""
 
-    proportional: Proportional = Field(description="The proportional term in cascade, in place of the one in automatic.")
+    proportional: Proportional = Field(
+        description="What the proportional term acts on in cascade (`on` and `weight`), in place of what it does in automatic."
+    )
 
 
 class Feedforward(Model):
@@ -466,7 +482,8 @@ class Transfer(Model):
     )
     first_scan: Literal["integrates", "holds"] = Field(
         default="integrates",
-        description="Whether the integral grows in the first automatic scan after `load-output`, `keep` or `zero`.",
+        description="Whether the integral grows in the first automatic scan after `load-output`, `keep` or `zero`; with "
+        "`running`, in the very first scan.",
     )
     loaded: Literal["limited", "as-it-is"] = Field(
         default="limited", description="With `load-output`: whether the output is limited to the output limits before it is loaded."
@@ -511,8 +528,8 @@ class Arithmetic(Model):
     """How numbers are computed."""
 
     type: Literal["float64", "float32", "integer"] = Field(
-        description="`float32`: every operation is rounded to 24 bits. `integer`: counts, with carried remainders "
-        "(specs/equations.md, section 7)."
+        description="`float64`. `float32`, the REAL of most PLCs: every operation is rounded to 24 bits. `integer`: whole counts, "
+        "with remainders that are carried to the next scan (specs/equations.md, section 7)."
     )
     literals: Literal["float32", "float64"] = Field(
         default="float32",
@@ -520,10 +537,11 @@ class Arithmetic(Model):
         "computed in float64 until it is stored.",
     )
     counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
-        default=None, description="With `integer`: counts per percent of setpoint, measurement and output."
+        default=None,
+        description="With `integer`: counts per percent of setpoint, measurement and output; 100 where 10000 counts are 100 %.",
     )
     gain_counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
-        default=None, description="With `integer`: counts per unit of the gain."
+        default=None, description="With `integer`: counts per unit of the gain; 100 where a dial of 1.00 is 100 counts."
     )
 
 
@@ -535,9 +553,11 @@ class Setting(Model):
         "proportional-weight", "derivative-weight", "tracking-time", "filter-factor", "integral-limit", "deadband", "gap-gain",
         "linearity", "feedforward-gain", "bias", "output-rate", "setpoint-rate", "resolution", "process-gain", "process-time",
         "process-delay", "closed-loop-time",
-    ] = Field(description="What the dial sets (specs/equations.md, section 1).")  # fmt: skip
+    ] = Field(description="What the dial sets, and with that its unit's meaning; see *Settings* above, and specs/equations.md, "
+              "section 1.")  # fmt: skip
     unit: Text = Field(
-        description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`."
+        description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`, `Hz`, "
+        "`eu`, `%/s`."
     )
     about: Text | None = Field(default=None, description="The vendor's own name or words for it.")
     default: Number | None = Field(
@@ -692,7 +712,9 @@ class Equation(Model):
     )
     error: ErrorShape | None = Field(default=None, description="What is done to the error; nothing if absent.")
     proportional: Proportional = Field(description="The proportional term.")
-    cascade: Cascade | None = Field(default=None, description="What is different in cascade; nothing if absent.")
+    cascade: Cascade | None = Field(
+        default=None, description="What is different in cascade, with a remote setpoint; nothing if absent."
+    )
     integral: Integral = Field(description="The integral term.")
     derivative: Derivative = Field(description="The derivative term.")
     feedforward: Feedforward | None = Field(default=None, description="Feedforward input; none if absent.")
@@ -702,7 +724,9 @@ class Equation(Model):
     output: Output = Field(description="Output.")
     arithmetic: Arithmetic | None = Field(default=None, description="How numbers are computed; float64 if absent.")
     faults: Faults | None = Field(
-        default=None, description="Signals that are not numbers, intervals that are none; `hold` if absent."
+        default=None,
+        description="What signals that are no numbers and scan intervals of zero or less do; nothing is computed "
+        "and the output stands, if absent.",
     )
     settings: dict[SettingName, Setting] = Field(min_length=1, description="The dials, by the vendor's own names.")
 

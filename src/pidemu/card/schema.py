@@ -24,12 +24,14 @@ from pidemu.card.models import CardFile, Equation
 BEGIN: Final = "<!-- generated from src/pidemu/card/models.py: begin -->"
 END: Final = "<!-- generated from src/pidemu/card/models.py: end -->"
 
-_WHOLE: Final = ("Filter", "Windup")
+_WHOLE: Final = ("Filter", "SignalFilter", "Windup")
 _ORDER: Final = (
-    CardFile, models.Source, models.Equation, models.Proportional, models.Integral, models.WindupNone, models.WindupClamp,
-    models.WindupGate, models.WindupBackCalculation, models.WindupExternalReset, models.WindupVelocity, models.Derivative,
-    models.Filter, models.Transfer, models.Setting, models.Option, models.Action, models.ActionExample, models.Scan,
-    models.Output, models.Evidence, models.Quirk, models.Example, models.Canonical,
+    CardFile, models.Source, models.Equation, models.Setpoint, models.Measurement, models.SignalFilter, models.ErrorShape,
+    models.Proportional, models.Cascade, models.Integral, models.IntegralLimits, models.WindupNone, models.WindupClamp,
+    models.WindupGate, models.WindupRecompute, models.WindupBackCalculation, models.WindupExternalReset, models.WindupVelocity,
+    models.WindupResetOutsideBand, models.Derivative, models.Filter, models.Feedforward, models.Transfer, models.Setting,
+    models.Option, models.Action, models.ActionExample, models.Scan, models.Output, models.Arithmetic, models.Faults,
+    models.Evidence, models.Quirk, models.Example, models.Canonical,
 )  # fmt: skip
 
 
@@ -117,7 +119,8 @@ def reference() -> str:
             if model is CardFile and name in Equation.model_fields:
                 continue
             need = "required" if field.is_required() else _default(field)
-            lines.append(f"| `{field.alias or name}` | {_type(field)} | {need} | {field.description} |")
+            meaning = (field.description or "").replace("|", "\\|")
+            lines.append(f"| `{field.alias or name}` | {_type(field)} | {need} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
 
@@ -149,6 +152,8 @@ def _name(t: Any) -> str:
         if all(n.startswith("[Windup") for n in names):
             return "one of the windup schemes below"
         return " or ".join(dict.fromkeys(names))
+    if t is Any:
+        return "anything"
     if origin is dict:
         return f"mapping of {_name(arguments[1])}"
     if origin is list:

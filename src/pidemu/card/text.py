@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pidemu.card.legend import Signals, filter_at_work, legend
 from pidemu.card.load import Variant
-from pidemu.card.models import Equation, Filter, Form
+from pidemu.card.models import Equation, Form, Proportional
 
 
-def equation_lines(variant: Variant) -> list[str]:
-    """Return the continuous equation, reverse acting, and what its symbols are (specs/equations.md, section 2).
+def equation_heading(variant: Variant) -> str:
+    """Return what kind of equation it is, and for which action.
 
     Parameters
     ----------
@@ -15,102 +16,128 @@ def equation_lines(variant: Variant) -> list[str]:
         The card with its options chosen.
     """
     q = variant.equation
-    lines = [f"OUT = {_sum(q)}"]
-    lines += _filter_lines(q)
-    lines += _symbol_lines(q)
-    return lines
+    kind = "from scan to scan" if q.form is Form.DAHLIN else "continuous"
+    if not q.action.fixed:
+        return f"Equation ({kind}, reverse acting)"
+    return f"Equation ({kind}; the error is {q.action.reverse.upper()}, and the sign of the gain decides the action)"
 
 
-def _signal(on: str, weight: str, pv: str) -> str:
-    return {"error": f"(SP - {pv})", "pv": f"(-{pv})", "weighted": f"({weight} SP - {pv})"}[on]
+def equation_lines(variant: Variant) -> list[str]:
+    """Return the equation, and what its symbols are (specs/equations.md, sections 2, 4 and 8).
+
+    It is continuous and reverse acting. Where there is no choice of action, it has the vendor's error and gain as they stand.
+
+    Parameters
+    ----------
+    variant : Variant
+        The card with its options chosen.
+    """
+    q = variant.equation
+    if q.form is Form.DAHLIN:
+        return [f"OUT = D(z) {_bracketed(_shaped(q, Signals.of(q).on('error'), 'integral'))}{_feedforward(q)}", *legend(q)]
+    lines = [f"OUT = {_sum(q, q.proportional, 'b')}"]
+    other = another_structure(q)
+    if other is not None:
+        lines.append(f"OUT = {_sum(q, other, 'bc')}   in cascade, with a remote SP")
+    return [*lines, *_series_lines(q), *legend(q)]
+
+
+def another_structure(q: Equation) -> Proportional | None:
+    """Return the proportional term in cascade, where it acts on something else than in automatic."""
+    if q.cascade is None:
+        return None
+    other = q.cascade.proportional
+    return None if (other.on, other.weight) == (q.proportional.on, q.proportional.weight) else other
+
+
+def _sum(q: Equation, proportional: Proportional, weight: str) -> str:
+    s, parallel = Signals.of(q), q.form is Form.PARALLEL
+    parts = _factored(q, proportional, s, weight) if _as_a_lead(q) else _terms(q, proportional, s, weight)
+    total = " + ".join(parts) or "0"
+    total = total if parallel else f"K [ {total} ]"
+    filt = filter_at_work(q)
+    if filt is not None and filt.applies_to == "output":
+        total = f"1/(1 + Tf s) {{ {total} }}"
+    if q.integral.on == "none" and q.implementation == "positional":
+        total += " + bias"
+    return total + _feedforward(q)
+
+
+def _feedforward(q: Equation) -> str:
+    if q.feedforward is None:
+        return ""
+    return " + FF" if q.feedforward.gain == 1 else " + kFF FF"
+
+
+def _is_series(q: Equation) -> bool:
+    return q.form is Form.SERIES and q.derivative.on != "none"
+
+
+def _as_a_lead(q: Equation) -> bool:
+    """Tell whether the derivative of a series form can be written as a lead L on the signals."""
+    return _is_series(q) and q.error is None and not q.action.fixed
+
+
+def _terms(q: Equation, proportional: Proportional, s: Signals, weight: str) -> list[str]:
+    parallel, series = q.form is Form.PARALLEL, _is_series(q)
+    parts = []
+    if proportional.on != "none":
+        acts = s.on(proportional.on, weight)
+        acts = acts if proportional.on == "pv" else _shaped(q, acts, "proportional")  # P on the measurement is no error
+        parts.append(("kp " if parallel else "") + _bracketed(acts))
+    if series:
+        parts.append("Dx")
+    if q.integral.on != "none":
+        acts = _shaped(q, s.on("error"), "integral")
+        acts = f"({acts} + Dx)" if series else _bracketed(acts)
+        parts.append(f"{'ki/s' if parallel else '1/(Ti s)'} {acts}")
+    if q.derivative.on != "none" and not series:
+        parts.append(f"{'kd' if parallel else 'Td'} {_derivative(q)} {_bracketed(s.on(q.derivative.on, 'c'))}")
+    return parts
+
+
+def _bracketed(acts: str) -> str:
+    return acts if acts == "E" or acts.startswith("S(") else f"({acts})"
+
+
+def _shaped(q: Equation, acts: str, term: str) -> str:
+    """Return what a term acts on, with its shape where the term has one (specs/equations.md, section 8)."""
+    e = q.error
+    return f"S({acts})" if e is not None and e.shape != "linear" and e.on in ("error", term) else acts
 
 
 def _derivative(q: Equation) -> str:
     filt = q.derivative.filter
-    return "s/(1 + Tf s)" if filt is not None and filt.applies_to == "term" else "s"
+    return "s/(1 + Tf s)" if filt is not None and filt.applies_to in ("term", "lead-lag") else "s"
 
 
-def _pv(q: Equation) -> str:
-    filt = q.derivative.filter
-    return "PVf" if filt is not None and filt.applies_to == "measurement" else "PV"
+def _factored(q: Equation, proportional: Proportional, s: Signals, weight: str) -> list[str]:
+    """Return the terms of the series form with the derivative as a lead L on the signals.
 
-
-def _sum(q: Equation) -> str:
-    pv = _pv(q)
-    if q.form is Form.SERIES and q.derivative.on != "none":
-        total = _series(q, pv)
-    else:
-        parts = []
-        parallel = q.form is Form.PARALLEL
-        if q.proportional.on != "none":
-            parts.append(("kp " if parallel else "") + _signal(q.proportional.on, "b", pv))
-        if q.integral.on != "none":
-            parts.append(f"{'ki/s' if parallel else '1/(Ti s)'} (SP - {pv})")
-        if q.derivative.on != "none":
-            parts.append(f"{'kd' if parallel else 'Td'} {_derivative(q)} {_signal(q.derivative.on, 'c', pv)}")
-        total = " + ".join(parts)
-        total = total if parallel else f"K [ {total} ]"
-    filt = q.derivative.filter
-    return f"1/(1 + Tf s) {{ {total} }}" if filt is not None and filt.applies_to == "output" else total
-
-
-def _series(q: Equation, pv: str) -> str:
-    lead = {"error": ("L SP", f"L {pv}"), "pv": ("SP", f"L {pv}"), "weighted": ("Lc SP", f"L {pv}")}
-    sp, measured = lead[q.derivative.on]
+    With ``Dx = (L - 1)(c SP - PV)`` and ``Lc = 1 + c (L - 1)``, P and Dx are together ``(b + Lc - 1) SP - L PV``.
+    """
+    lead = {"error": "L", "pv": "", "weighted": "Lc"}[q.derivative.on]
+    sp = f"{lead} {s.sp}".strip()
+    error = f"L ({s.sp} - {s.pv})" if lead == "L" else f"({sp} - L {s.pv})"
+    b = {"error": "1", "pv": "0", "weighted": weight}.get(proportional.on, "")
     parts = []
-    if q.proportional.on != "none":
-        weighted = {"error": sp, "pv": sp if q.derivative.on != "pv" else "", "weighted": f"b {sp}"}[q.proportional.on]
-        if q.proportional.on == "weighted" and q.derivative.on == "weighted":
-            weighted = "(b + Lc - 1) SP"
-        parts.append(f"({weighted} - {measured})" if weighted else f"(-{measured})")
+    if b == "1":
+        parts.append(error)
+    elif b == "0":
+        parts.append(f"(({lead} - 1) {s.sp} - L {s.pv})" if lead else f"(-L {s.pv})")
+    elif b:
+        parts.append(f"(({b} + {lead} - 1) {s.sp} - L {s.pv})" if lead else f"({b} {s.sp} - L {s.pv})")
     if q.integral.on != "none":
-        parts.append(f"1/(Ti s) ({sp} - {measured})")
-    return f"K [ {' + '.join(parts)} ]"
+        parts.append(f"1/(Ti s) {error}")
+    return parts
 
 
-def _filter_lines(q: Equation) -> list[str]:
-    if q.derivative.on == "none":
+def _series_lines(q: Equation) -> list[str]:
+    if not _is_series(q):
         return []
     filt = q.derivative.filter
-    lines = []
-    if q.form is Form.SERIES:
-        lead_lag = filt is not None and filt.applies_to == "lead-lag"
-        lead = "(1 + Td s)/(1 + Tf s)" if lead_lag else f"1 + Td {_derivative(q)}"
-        lines.append(f"L = {lead}")
-        if q.derivative.on == "weighted":
-            lines.append("Lc = 1 + c (L - 1)")
-    if filt is not None:
-        if filt.applies_to == "measurement":
-            lines.append(f"PVf = PV/(1 + Tf s{' + Tf^2 s^2/2' if filt.order == 2 else ''})")
-        lines.append(f"Tf = {_filter_time(filt, q)}")
-    return lines
-
-
-def _filter_time(filt: Filter, q: Equation) -> str:
-    time = "kd dial" if q.form is Form.PARALLEL else "Td"
-    if filt.of == "effective-derivative":
-        time = "Ti Td/(Ti + Td)"
-    if filt.time is not None:
-        return f"{filt.time} s" if isinstance(filt.time, float) else filt.time
-    if filt.ratio is not None:
-        return f"{filt.ratio:g} {time}" if isinstance(filt.ratio, float) else f"{filt.ratio} x {time}"
-    return f"{time} / {filt.gain:g}" if isinstance(filt.gain, float) else f"{time} / {filt.gain}"
-
-
-def _symbol_lines(q: Equation) -> list[str]:
-    parallel = q.form is Form.PARALLEL
-    symbols = {
-        "gain": "kp" if parallel else "K",
-        "integral": "ki" if parallel else "Ti",
-        "derivative": "kd" if parallel else "Td",
-    }
-    multiplier = next((n for n, s in q.settings.items() if s.sets == "multiplier"), None)
-    lines = []
-    for name, s in q.settings.items():
-        if s.sets in symbols:
-            value = f"{multiplier} x {name}" if multiplier and (parallel or s.sets == "gain") else name
-            lines.append(f"{symbols[s.sets]} from {value} [{s.unit}]")
-    for term, symbol in ((q.proportional, "b"), (q.derivative, "c")):
-        if term.on == "weighted":
-            lines.append(f"{symbol} = {term.weight if isinstance(term.weight, str) else f'{term.weight:g}'}")
-    return lines
+    lead_lag = filt is not None and filt.applies_to == "lead-lag"
+    if not _as_a_lead(q):
+        return [f"Dx = {'(Td - Tf)' if lead_lag else 'Td'} {_derivative(q)} {_bracketed(Signals.of(q).on(q.derivative.on, 'c'))}"]
+    lines = ["L = (1 + Td s)/(1 + Tf s)" if lead_lag else f"L = 1 + Td {_derivative(q)}"]
+    return [*lines, "Lc = 1 + c (L - 1)"] if q.derivative.on == "weighted" else lines

@@ -1,4 +1,7 @@
-"""Rules on the equation that each combination of options makes: one function each, which says in one sentence why."""
+"""Rules on the equation that each combination of options makes: one function each, which says in one sentence why.
+
+Here are those on dials and terms; `pidemu.checks.stages` has those on what stands around the terms.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,9 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.load import Variant, dotted, variants
-from pidemu.card.models import GENERAL_RULES, Equation, Rule, WindupBackCalculation, WindupGate
+from pidemu.card.models import Derivative, Equation, Proportional, Rule
 from pidemu.card.source import Path_
+from pidemu.checks import stages
 from pidemu.errors import PidemuError, Problem, suggest
 from pidemu.settings import limits, off_values
 from pidemu.units import Dimension, Role, check_unit, parse_quantity, parse_unit
@@ -20,12 +24,25 @@ _NEUTRAL: Final = {
     "filter-time": 0.0,
     "filter-ratio": 0.0,
     "derivative": 0.0,
+    "filter-factor": 1.0,
+    "deadband": 0.0,
+    "gap-gain": 1.0,
+    "linearity": 1.0,
+    "bias": 0.0,
+    "output-rate": math.inf,
+    "setpoint-rate": math.inf,
+    "resolution": 0.0,
+    "process-delay": 0.0,
 }
+"""Values that leave everything as it is."""
 
 _BY_ROLE: Final = (
     "gain", "multiplier", "integral", "derivative", "bias", "process-gain", "process-time", "process-delay", "closed-loop-time",
 )  # fmt: skip
 """Roles that need no field to name them."""
+_OF_TERMS: Final = ("gain", "multiplier", "integral", "derivative", "bias")
+_OF_THE_PROCESS: Final = ("process-gain", "process-time", "process-delay", "closed-loop-time")
+_RATES: Final = ("output-rate", "setpoint-rate")
 _WORDS: Final = {"tracking-time": ("Ti", "sqrt(Ti Td)"), "integral-limit": ("output",)}
 """Words that stand where a setting's name could."""
 _REFERENCES: Final = (
@@ -114,18 +131,19 @@ def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
-    """Each term has exactly one dial."""
+    """Each term has exactly one dial, and no dial is of a term that the form does not have."""
     equation, document = variant.equation, variant.card.document
     dahlin = equation.form == "dahlin"
     roles = {
         "gain": not dahlin and not (equation.form == "parallel" and equation.proportional.on == "none"),
+        "multiplier": False,
         "integral": not dahlin and equation.integral.on != "none",
         "derivative": equation.derivative.on != "none",
+        "bias": False,
         "process-gain": dahlin,
         "process-time": dahlin,
-        "process-delay": dahlin,
+        "process-delay": False,
         "closed-loop-time": dahlin,
-        "bias": False,
     }
     for role, needed in roles.items():
         dials = [n for n, s in equation.settings.items() if s.sets == role]
@@ -135,28 +153,46 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
             yield document.problem(
                 variant.home(("settings", dials[1])), f"'{dials[0]}' and '{dials[1]}' both set the {role}", at_key=True
             )
+        if dials and role in (_OF_TERMS if dahlin else _OF_THE_PROCESS):
+            message = f"'{dials[0]}' sets the {role}, which form '{equation.form.value}' does not have; remove it"
+            yield document.problem(variant.home(("settings", dials[0])), message, at_key=True)
 
 
 def reject_bad_references(variant: Variant) -> Iterator[Problem]:
     """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
     equation, document = variant.equation, variant.card.document
     for path, name, role in _references(equation):
-        signed = role == "integral-limit"
-        if isinstance(name, float) and (math.isnan(name) if signed else not 0 <= name < math.inf):
-            yield document.problem(variant.home(path), f"{path[-1]} is {name:g}; it is a number{'' if signed else ' from 0 up'}")
+        if isinstance(name, float):
+            wrong = _wrong_number(str(path[-1]), role, name)
+            if wrong is not None:
+                yield document.problem(variant.home(path), wrong)
         if not isinstance(name, str) or name in _WORDS.get(role, ()):
             continue
         setting = equation.settings.get(name)
         if setting is None:
             yield document.problem(variant.home(path), f"no setting '{name}'{suggest(name, equation.settings)}")
         elif setting.sets != role:
-            yield document.problem(variant.home(path), f"'{name}' sets the {setting.sets}, here a {role} is needed")
-    named = {name for _, name, _ in _references(equation)}
-    everywhere = {n for v in variants(variant.card) for _, n, _ in _references(v.equation)}
-    for name, setting in equation.settings.items():
-        needs = setting.sets not in _BY_ROLE
-        if needs and name not in named and name not in everywhere:
+            yield document.problem(variant.home(path), f"'{name}' sets the {setting.sets}; here one that sets the {role} is needed")
+    used = {name for v in variants(variant.card) for name in _used(v.equation)}
+    for name in equation.settings:
+        if name not in used:
             yield document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
+
+
+def _wrong_number(field: str, role: str, x: float) -> str | None:
+    """Return what is wrong with a number that stands where a setting's name could."""
+    if role == "integral-limit":
+        return f"{field} is {x:g}; it is a number" if math.isnan(x) else None
+    if not 0 <= x < math.inf and role != "filter-factor":  # which has a rule of its own
+        return f"{field} is {x:g}; it is a number from 0 up"
+    return f"{field} is 0: nothing would ever move; give a number above 0" if x == 0 and role in _RATES else None
+
+
+def _used(equation: Equation) -> Iterator[object]:
+    """Yield the settings that an equation uses: by a field that names them, or by their role."""
+    yield from (name for _, name, _ in _references(equation))
+    off = {"integral": equation.integral.on == "none", "derivative": equation.derivative.on == "none"}
+    yield from (n for n, s in equation.settings.items() if s.sets in _BY_ROLE and not off.get(s.sets, False))
 
 
 def _references(equation: Equation) -> Iterator[tuple[Path_, object, str]]:
@@ -169,108 +205,16 @@ def _references(equation: Equation) -> Iterator[tuple[Path_, object, str]]:
             yield tuple(key.replace("_", "-") for key in path), part, role
 
 
-def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
-    """A filter on a signal has a time or a factor, and a factor is a share of the new sample."""
-    for key in ("setpoint", "measurement", "error"):
-        part = getattr(variant.equation, key)
-        if part is None or part.filter is None:
-            continue
-        home = variant.home((key, "filter"))
-        if (part.filter.time is None) == (part.filter.factor is None):
-            yield variant.card.document.problem(home, "a filter on a signal needs exactly one of time and factor", at_key=True)
-        if isinstance(part.filter.factor, float) and not 0 < part.filter.factor <= 1:
-            yield variant.card.document.problem((*home, "factor"), f"factor is {part.filter.factor:g}; it is above 0, up to 1")
-
-
-def reject_bad_error(variant: Variant) -> Iterator[Problem]:
-    """A shape of the error has what it needs and nothing else, and a filtered error is what P and D act on."""
-    equation, document = variant.equation, variant.card.document
-    error = equation.error
-    if error is None:
-        return
-    home = variant.home(("error",))
-    for key, shape in (("band", "gap"), ("linearity", "gain-linear")):
-        given = getattr(error, key) is not None
-        if given != (error.shape == shape):
-            message = f"shape '{shape}' needs '{key}'" if not given else f"'{key}' has no meaning with shape '{error.shape}'"
-            yield document.problem(home, message, at_key=True)
-    if error.shape != "gap" and (error.gain != 0 or error.subtracted or error.zero_crossing):
-        yield document.problem(home, "'gain', 'subtracted' and 'zero-crossing' belong to shape 'gap'", at_key=True)
-    if error.filter is not None and not {equation.proportional.on, equation.derivative.on} <= {"error", "none"}:
-        yield document.problem(home, "a filter on the error needs P and D on the error", at_key=True)
-
-
-def reject_bad_cascade(variant: Variant) -> Iterator[Problem]:
-    """In cascade the proportional term may have another setpoint weight, and nothing else."""
-    equation, cascade = variant.equation, variant.equation.cascade
-    if cascade is not None and (cascade.proportional.on == "none" or equation.proportional.on == "none"):
-        message = "a proportional term that comes or goes with the mode is not defined"
-        yield variant.card.document.problem(variant.home(("cascade",)), message, at_key=True)
-
-
-def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
-    """The fine print of a transfer goes with the transfer that it belongs to."""
-    equation, document = variant.equation, variant.card.document
-    t, home = equation.transfer, variant.home(("transfer",))
-    if equation.implementation == "velocity" and (t.start != "bumpless" or t.power_up != "transfer"):
-        yield document.problem(home, "a velocity implementation starts from the last output: 'bumpless'", at_key=True)
-    if t.first_scan == "holds" and t.start in ("bumpless", "tracked"):
-        yield document.problem(home, f"'first-scan' has no meaning with start '{t.start}'", at_key=True)
-    if t.start != "load-output" and (t.loaded != "limited" or t.without_integral != "kept"):
-        yield document.problem(home, "'loaded' and 'without-integral' belong to start 'load-output'", at_key=True)
-    if t.changes == "bumpless" and equation.integral.holds != "ki e":
-        yield document.problem(home, "'changes: bumpless' needs an integral that holds 'ki e'", at_key=True)
-
-
-def reject_bad_arithmetic(variant: Variant) -> Iterator[Problem]:
-    """Whole numbers have a size, and an algorithm that is written for them."""
-    equation, document, a = variant.equation, variant.card.document, variant.equation.arithmetic
-    if a is None:
-        return
-    home = variant.home(("arithmetic",))
-    if (a.type == "integer") != (a.counts is not None and a.gain_counts is not None):
-        yield document.problem(home, "'counts' and 'gain-counts' go with type 'integer'", at_key=True)
-    if a.type != "float32" and a.literals != "float32":
-        yield document.problem(home, "'literals' belongs to type 'float32'", at_key=True)
-    fits = equation.form == "standard" and equation.implementation == "velocity" and equation.integral.rule is Rule.BACKWARD
-    fits = fits and equation.proportional.on == "error" and equation.derivative.on in ("pv", "none")
-    if a.type == "integer" and not fits:
-        message = "type 'integer' is defined for velocity, standard form, backward rule, P on error, D on pv"
-        yield document.problem(home, message, at_key=True)
-
-
-def reject_bad_pole_cancellation(variant: Variant) -> Iterator[Problem]:
-    """Pole cancellation is a recursion on past outputs and has no terms of its own."""
-    equation = variant.equation
-    if equation.form != "dahlin":
-        return
-    if equation.implementation != "velocity" or (equation.proportional.on, equation.derivative.on) != ("none", "none"):
-        message = "form 'dahlin' is a velocity implementation without P and D: 'on: none'"
-        yield variant.card.document.problem(variant.home(("form",)), message)
-
-
-def reject_bad_derivative_rule(variant: Variant) -> Iterator[Problem]:
-    """Two rules of the derivative have a say in its filter."""
-    rule, filt = variant.equation.derivative.rule, variant.equation.derivative.filter
-    on_term = filt is not None and filt.applies_to in ("term", "lead-lag")
-    if variant.equation.derivative.on == "none":
-        return
-    home = variant.home(("derivative", "rule"))
-    if rule == "lagged-difference" and not on_term:
-        yield variant.card.document.problem(home, "the lagged-difference rule needs a filter on the term")
-    if rule == "four-point" and on_term:
-        yield variant.card.document.problem(home, "the four-point rule goes with no other filter on the term")
-    if filt is not None and not on_term and filt.rule is None and rule not in GENERAL_RULES:
-        yield variant.card.document.problem(home, f"the filter needs a rule of its own: '{rule}' is one of the derivative only")
-
-
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
     """A weight goes with 'on: weighted' and with nothing else."""
-    for term in ("proportional", "derivative"):
-        part = getattr(variant.equation, term)
+    q = variant.equation
+    parts: list[tuple[Path_, Proportional | Derivative]] = [(("proportional",), q.proportional), (("derivative",), q.derivative)]
+    if q.cascade is not None:
+        parts.append((("cascade", "proportional"), q.cascade.proportional))
+    for path, part in parts:
         if (part.on == "weighted") != (part.weight is not None):
             message = "'on: weighted' needs 'weight'" if part.weight is None else f"'weight' has no meaning with 'on: {part.on}'"
-            yield variant.card.document.problem(variant.home((term, "on")), message, at_key=True)
+            yield variant.card.document.problem(variant.home((*path, "on")), message, at_key=True)
 
 
 def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
@@ -288,6 +232,9 @@ def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, "a filter of order 2 is defined for the measurement only", at_key=True)
     if filt.of == "effective-derivative" and filt.time is not None:
         yield document.problem(home, "'of' refers to ratio or gain, not to time", at_key=True)
+    if filt.rule is not None and filt.applies_to in ("term", "lead-lag"):
+        message = "'rule' here is that of a filter on measurement or output; the term's is 'derivative.rule'"
+        yield document.problem((*home, "rule"), message)
 
 
 def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
@@ -311,28 +258,6 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
         and not equation.proportional.accumulated
     ):
         yield document.problem(home, "clamp-sum with P on pv needs 'proportional.accumulated: true'", at_key=True)
-
-
-def reject_bad_windup_details(variant: Variant) -> Iterator[Problem]:
-    """The fine print of a windup scheme goes with the scheme that it belongs to."""
-    windup, document, home = variant.equation.integral.windup, variant.card.document, variant.home(("integral", "windup"))
-    if isinstance(windup, WindupGate):
-        freezes = windup.scheme == "freeze"
-        if not freezes and (windup.judged_on != "output" or windup.direction != "further"):
-            yield document.problem(home, "'judged-on' and 'direction' belong to 'freeze'", at_key=True)
-        if freezes and windup.test != "increment":
-            yield document.problem(home, "'test' belongs to 'conditional'", at_key=True)
-    if isinstance(windup, WindupBackCalculation):
-        word = windup.tracking_time in ("Ti", "sqrt(Ti Td)")
-        if word and (windup.times is not None or windup.when_off is not None):
-            yield document.problem(home, "'times' and 'when-off' go with a number or a setting under 'tracking-time'", at_key=True)
-    if variant.equation.integral.holds != "ki e" and (
-        variant.equation.implementation == "velocity"
-        or variant.equation.form == "parallel"
-        or windup.scheme in ("clamp", "clamp-sum")
-    ):
-        message = "an integral that does not hold 'ki e' needs a positional implementation with one gain, and limits of its own"
-        yield document.problem(variant.home(("integral", "holds")), message)
 
 
 def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
@@ -367,13 +292,6 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_weights,
     reject_bad_filter,
     reject_bad_windup,
-    reject_bad_windup_details,
-    reject_bad_signal_filters,
-    reject_bad_error,
-    reject_bad_cascade,
-    reject_bad_transfer,
-    reject_bad_arithmetic,
-    reject_bad_pole_cancellation,
-    reject_bad_derivative_rule,
+    *stages.RULES,
     reject_wrong_action,
 )

@@ -22,13 +22,13 @@ def reject_wrong_examples(card: Card) -> Iterator[Problem]:
     """Every example is run."""
     for i, example in enumerate(card.data.examples):
         place = ("examples", i)
-        if example.canonical is None and example.outputs is None:
+        if example.canonical is None and not example.outputs:
             yield card.document.problem(place, "an example needs 'canonical' or 'outputs', or both")
         try:
             settings = card.settings(example.given)
             if example.canonical is not None:
                 yield from _wrong_gains(card, i, settings, example.canonical)
-            if example.outputs is not None:
+            if example.outputs:
                 yield from _wrong_outputs(card, i, settings, example.outputs)
         except PidemuError as error:
             for line in str(error).splitlines():
@@ -36,9 +36,16 @@ def reject_wrong_examples(card: Card) -> Iterator[Problem]:
 
 
 def _wrong_gains(card: Card, i: int, settings: Settings, stated: Canonical) -> Iterator[Problem]:
-    n0, n1, n2, d1, d2 = settings.law().coefficients()
+    try:
+        n0, n1, n2, d1, d2 = settings.law().coefficients()
+    except UndefinedError as error:
+        yield card.document.problem(
+            ("examples", i, "canonical"), f"{str(error).partition(';')[0]}; state 'outputs' instead", at_key=True
+        )
+        return
     if abs(d2) > 1e-12:
-        yield card.document.problem(("examples", i), "a second-order filter has no parallel gains; choose settings without it")
+        message = "two filters, or one of second order, have no parallel gains; choose settings without, or state 'outputs'"
+        yield card.document.problem(("examples", i), message)
         return
     kp = n1 - n0 * d1
     for name, value in {"kp": kp, "ki": n0, "kd": n2 - kp * d1, "Tf": d1}.items():
@@ -55,7 +62,8 @@ def _wrong_outputs(card: Card, i: int, settings: Settings, stated: list[float]) 
     rest = controller.run(50.0, [50.0] * _AT_REST)[-1]
     for n, value in enumerate(controller.run(51.0, [50.0] * len(stated)) - rest):
         if not math.isclose(stated[n], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-6):
-            yield card.document.problem(("examples", i, "outputs", n), f"output {n} is {stated[n]:g}, the card's is {value:.6g}")
+            message = f"output {n + 1} is {stated[n]:g}, the settings amount to {value:.6g}"
+            yield card.document.problem(("examples", i, "outputs", n), message)
 
 
 def reject_unrunnable(card: Card) -> Iterator[Problem]:

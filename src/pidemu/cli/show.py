@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import textwrap
+from collections.abc import Sequence
+from typing import Final
+
 import click
 
+from pidemu.card.at_limits import limit_rows
+from pidemu.card.behaviour import mode_rows, scan_rows
 from pidemu.card.library import load_card
-from pidemu.card.load import Card, Variant
-from pidemu.card.models import Setting
-from pidemu.card.text import equation_lines
-from pidemu.cli.common import assignments, heading, json_option, number, print_json, table, vendors_option, wrapped
+from pidemu.card.load import EMULATION, Card, Variant
+from pidemu.card.models import Evidence, Example, Setting
+from pidemu.card.text import equation_heading, equation_lines
+from pidemu.cli.common import assignments, heading, json_option, number, print_json, vendors_option, wrapped
 from pidemu.plain import json_safe
 from pidemu.settings import is_active, off_values
+
+_WIDTH: Final = 110
+_LEAST: Final = 36
+"""Narrowest last column."""
+_COLOUR: Final = {"assumed": "yellow", "inferred": "cyan", "documented": "green", "measured": "green"}
 
 
 @click.command("show", short_help="Show a card as a data sheet, with its evidence.")
@@ -29,13 +42,33 @@ def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_js
     if found.data.about:
         wrapped(found.data.about)
     _options(found, variant)
-    heading("\nEquation (continuous, reverse acting)")
+    heading(f"\n{equation_heading(variant)}")
     for line in equation_lines(variant):
-        click.echo(f"  {line}")
-    _facts(variant)
+        wrapped(line, "  ")
+    for title, rows in (("Scan by scan", scan_rows), ("At the limits", limit_rows), ("Modes and signals", mode_rows)):
+        heading(f"\n{title}")
+        _sheet(rows(variant.equation))
     _settings(variant)
     _evidence(variant)
     _rest(found)
+
+
+def _sheet(rows: Sequence[Sequence[str]], columns: Sequence[str] = ()) -> None:
+    """Print aligned columns, the last of which is wrapped."""
+    lines = [*([columns] if columns else []), *rows]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]) - 1)]
+    indent = 2 + sum(w + 2 for w in widths)
+    total = min(_WIDTH, shutil.get_terminal_size().columns) if sys.stdout.isatty() else _WIDTH
+    for line in lines:
+        first = "".join(_coloured(cell) + " " * (w - len(cell) + 2) for cell, w in zip(line, widths, strict=False))
+        text = textwrap.wrap(line[-1], max(total - indent, _LEAST), break_long_words=False) or [""]
+        click.echo(f"  {first}{text[0]}".rstrip())
+        for more in text[1:]:
+            click.echo(" " * indent + more)
+
+
+def _coloured(cell: str) -> str:
+    return click.style(cell, fg=_COLOUR[cell]) if cell in _COLOUR else cell
 
 
 def _options(card: Card, variant: Variant) -> None:
@@ -44,34 +77,9 @@ def _options(card: Card, variant: Variant) -> None:
     heading("\nOptions")
     rows = []
     for name, choices in card.options.items():
-        about = card.data.options[name].about or ""
-        rows.append([name, variant.chosen[name], ", ".join(choices), about])
-    table(["option", "shown", "choices (default first)", ""], rows)
-
-
-def _facts(variant: Variant) -> None:
-    q = variant.equation
-    words = q.action.names
-    heading("\nScan by scan")
-    start = {
-        "bumpless": "bumpless, where there is integral action",
-        "load-output": "the integral is loaded with the output, the terms come on top",
-    }
-    rows = [
-        ["form", q.form.value],
-        ["implementation", q.implementation],
-        [
-            "integral",
-            f"{q.integral.rule.value}, windup: {q.integral.windup.scheme}" if q.integral.on != "none" else "none",
-        ],
-        ["derivative", q.derivative.rule.value if q.derivative.on != "none" else "none"],
-        ["to automatic", start[q.transfer.start]],
-        ["action", f"reverse (output falls when PV rises) is called '{words['reverse']}', direct '{words['direct']}'"],
-        ["signals", "% of span" if q.signals == "percent" else "engineering units"],
-        ["default scan", q.scan.default],
-        ["default limits", f"{number(q.output.limits[0])} to {number(q.output.limits[1])}"],
-    ]
-    table(["", ""], rows)
+        about = card.data.options[name].about
+        rows.append([name, variant.chosen[name], ", ".join(choices) + (f": {about}" if about else "")])
+    _sheet(rows, ["option", "shown", "choices, the default first"])
 
 
 def _settings(variant: Variant) -> None:
@@ -80,9 +88,12 @@ def _settings(variant: Variant) -> None:
     for name, s in variant.equation.settings.items():
         about = s.about or ""
         if not is_active(variant.equation, name, s):
-            about = f"not used with these options. {about}".strip()
+            about = "not used with these options" + (f": {about}" if about else "")
+        step = f"in steps of {number(s.resolution)}" if s.resolution is not None else ""
+        shared = "one for many loops" if s.scope == "module" else ""
+        about = ", ".join(filter(None, (about, step, shared)))
         rows.append([name, s.sets, s.unit, _default(s), _range(s), ", ".join(number(x) for x in off_values(s)), about])
-    table(["name", "sets", "unit", "default", "range", "off", ""], rows)
+    _sheet(rows, ["name", "sets", "unit", "default", "range", "off", ""])
 
 
 def _default(s: Setting) -> str:
@@ -95,18 +106,23 @@ def _range(s: Setting) -> str:
 
 def _evidence(variant: Variant) -> None:
     heading("\nEvidence")
-    rows = {}
-    for statement in variant.statements():
-        e = statement.evidence
-        if e is not None:
-            place = f"[{e.source}] {e.at or ''}".strip() if e.source else ""
-            rows[statement.key] = [statement.key, e.status.value, place, e.note or ""]
-    table(["field", "status", "source", "note"], list(rows.values()))
+    stated = {s.key: s.evidence for s in variant.statements() if s.evidence is not None}
+    emulation = variant.card.data.evidence.get(EMULATION)
+    if emulation is not None:
+        stated = {EMULATION: emulation, **stated}
+    rows = [[key, e.status.value, _grounds(e)] for key, e in stated.items()]
+    _sheet(rows, ["field", "status", "where it is stated, or why it is taken so"])
     assumed = variant.assumptions()
     if assumed:
         heading("\nAssumed - nobody says so, and results rest on it")
         for a in assumed:
             wrapped(str(a), "  - ")
+
+
+def _grounds(e: Evidence) -> str:
+    place = f"[{e.source}] {e.at or ''}".strip() if e.source else ""
+    between = "; " if e.at and e.note else " " if place and e.note else ""
+    return f"{place}{between}{e.note or ''}"
 
 
 def _rest(card: Card) -> None:
@@ -121,19 +137,32 @@ def _rest(card: Card) -> None:
             wrapped(quirk.text + (f" [{quirk.source}]" if quirk.source else ""), "  - ")
     heading("\nExamples")
     for example in card.data.examples:
-        given = ", ".join(f"{k}={v if isinstance(v, str) else number(v)}" for k, v in example.given.items())
+        wrapped(_example(example), "  - ")
+
+
+def _example(example: Example) -> str:
+    given = ", ".join(f"{k}={v if isinstance(v, str) else number(v)}" for k, v in example.given.items()) or "as it comes"
+    amounts = []
+    if example.canonical is not None:
         c = example.canonical
-        gains = f"kp {number(c.kp)}, ki {number(c.ki)} 1/s, kd {number(c.kd)} s" + (f", Tf {number(c.Tf)} s" if c.Tf else "")
-        wrapped(f"{given}: {gains}" + (f" [{example.source}]" if example.source else ""), "  - ")
+        gains = f"kp {number(c.kp)}, ki {number(c.ki)} 1/s, kd {number(c.kd)} s"
+        amounts.append(gains + (f", Tf {number(c.Tf)} s" if c.Tf else ""))
+    if example.outputs:
+        moves = ", ".join(number(x) for x in example.outputs)
+        amounts.append(f"after a setpoint step of 1 the output has moved by {moves}, scan by scan")
+    note = f" ({example.note})" if example.note else ""
+    return f"{given}: {'; '.join(amounts)}{note}" + (f" [{example.source}]" if example.source else "")
 
 
 def _plain(variant: Variant) -> dict[str, object]:
     card = variant.card
+    q = variant.equation
     return {
         "card": card.id,
         "title": card.title,
         "options": dict(variant.chosen),
         "equation": equation_lines(variant),
+        "behaviour": dict([*scan_rows(q), *limit_rows(q), *mode_rows(q)]),
         "content": json_safe(card.data.model_dump(mode="python", by_alias=True, exclude_none=True)),
         "assumed": [a.path for a in variant.assumptions()],
     }
