@@ -17,10 +17,11 @@ from pidemu.algorithm import Algorithm
 from pidemu.card.library import load_card
 from pidemu.card.load import Card, card_from
 from pidemu.card.models import Rule, Setting
+from pidemu.card.references import is_active
 from pidemu.card.source import parse
 from pidemu.errors import SettingError
 from pidemu.scan.program import Program
-from pidemu.settings import Settings, is_active, limits, off_values
+from pidemu.settings import Settings, limits, off_values
 from pidemu.targets.python import compiled
 from pidemu.units import Role, from_canonical, parse_unit
 

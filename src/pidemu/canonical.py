@@ -240,6 +240,8 @@ def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: f
         time = read.pick(filt.time, 0.0)
         return Lag(time, 1.0, filt.rule) if time else None
     factor = read.pick(filt.factor, 1.0)
+    if not 0 < factor <= 1:
+        raise SettingError(f"{read.settings.card.id}: {filt.factor} is {factor:g}; a share of the new sample is above 0, up to 1")
     return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
 
 

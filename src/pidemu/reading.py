@@ -9,8 +9,9 @@ from typing import Final
 
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.models import Form, Setting
+from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.settings import RESERVED, Settings, Value, is_active, limits, off_values, spans_of
+from pidemu.settings import RESERVED, Settings, Value, limits, off_values, spans_of
 from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
 
 _PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)

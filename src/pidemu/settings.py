@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.load import Card, Statement, Variant
-from pidemu.card.models import Equation, Form, Setting, WindupBackCalculation
+from pidemu.card.models import Equation, Setting
 from pidemu.units import FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
@@ -241,41 +241,3 @@ class Settings(Mapping[str, Value]):
 def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
     """Return the spans of signal ranges; 100 where none is given."""
     return Spans(pv[1] - pv[0] if pv else 100.0, op[1] - op[0] if op else 100.0)
-
-
-def is_active(equation: Equation, name: str, setting: Setting) -> bool:
-    """Tell whether the equation uses a dial."""
-    has_derivative = equation.derivative.on != "none"
-    filt = equation.derivative.filter
-    windup = equation.integral.windup
-    match Role(setting.sets):
-        case Role.GAIN:
-            return not (equation.form is Form.PARALLEL and equation.proportional.on == "none")
-        case Role.INTEGRAL:
-            return equation.integral.on != "none"
-        case Role.DERIVATIVE:
-            return has_derivative
-        case Role.FILTER_RATIO | Role.FILTER_GAIN:
-            return has_derivative and filt is not None and name in (filt.ratio, filt.gain)
-        case Role.FILTER_TIME:
-            of_derivative = filt is not None and name == filt.time and (has_derivative or filt.applies_to != "term")
-            return of_derivative or name in _signal_filter_times(equation)
-        case Role.PROPORTIONAL_WEIGHT:
-            return equation.proportional.on == "weighted" and name == equation.proportional.weight
-        case Role.DERIVATIVE_WEIGHT:
-            return equation.derivative.on == "weighted" and name == equation.derivative.weight
-        case Role.TRACKING_TIME:
-            return isinstance(windup, WindupBackCalculation) and equation.integral.on != "none" and name == windup.tracking_time
-        case Role.DEADBAND:
-            return (equation.error is not None and equation.error.shape == "gap") or equation.integral.deadband == name
-        case Role.GAP_GAIN:
-            return equation.error is not None and equation.error.shape == "gap"
-        case Role.LINEARITY:
-            return equation.error is not None and equation.error.shape == "gain-linear"
-        case _:
-            return True
-
-
-def _signal_filter_times(equation: Equation) -> list[object]:
-    parts = (equation.setpoint, equation.measurement, equation.error)
-    return [part.filter.time for part in parts if part is not None and part.filter is not None]

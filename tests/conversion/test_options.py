@@ -11,9 +11,10 @@ import pytest
 
 import pidemu
 from pidemu.card.load import variants
+from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError, UndefinedError
-from pidemu.settings import Settings, is_active, limits
+from pidemu.settings import Settings, limits
 from tests.checks.bench import VALID, edited, written
 from tests.conversion.support import needed
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.signals import Event
 from pidemu.errors import RecordError, ScanError
 from pidemu.record.files import Floats, Record
 from pidemu.record.playback import Playback, Saturation, even_step, modes, play, spells, timing, unsupported
+from pidemu.signals import Event
 
 NAN = math.nan
 PI = pidemu.load_card("generic/standard").settings(K=2, Ti=10)

@@ -16,12 +16,13 @@ import pidemu
 from pidemu.algorithm import Algorithm, Place, Scheme
 from pidemu.card.load import variants
 from pidemu.card.models import GENERAL_RULES, Rule
+from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.errors import ScanError
 from pidemu.law import Law
 from pidemu.scan.build import build
 from pidemu.scan.program import Binary, Expr, Name, Number, Operator, Program, Select
-from pidemu.settings import is_active, limits
+from pidemu.settings import limits
 from pidemu.targets.python import compiled, render, source
 from tests.helpers import WIDE, Floats, linear, outputs, scans_of, settings_of
 

@@ -22,17 +22,17 @@ _HOW: Final = {
 _HEAD: Final = """\
 # How the emulations were verified
 
-Generated from the cards' evidence by `python -m pidemu.card.emulation`; do not edit. What the four words mean:
+Generated from the cards' evidence by `python -m pidemu.card.emulation`; do not edit. What the words mean:
 
 - **against the real implementation**: a test compares the card's outputs, scan by scan, with outputs of the real thing;
-- **against the published scan equation**: a test compares it with a computation of its own, written from the scan equation or the program text that
-  the maker publishes;
-- **against the law alone**: no scan equation is published. The program's linear response equals the law that the maker states; rules, windup and
-  transfers are what the card says of them;
+- **against the published scan equation**: a test compares them with a computation of its own, written from the scan equation or the
+  program text that the maker publishes;
+- **against the law alone**: no scan equation was found. The program's linear response equals the law that the maker states; rules,
+  windup and transfers are what the card says of them;
 - **only assumed**: not even that.
 
-In every case property tests hold for the card: the program's impulse response is that of its discrete law, the output stays inside its limits, and a
-transfer that is called bumpless is.
+In every case property tests hold for the card: the program's impulse response is that of its discrete law, the output stays inside
+its limits, and a transfer that is called bumpless is.
 """
 
 
@@ -40,11 +40,11 @@ def table() -> str:
     """Return the page: one row per card, and what each card assumes of its scan-by-scan behaviour."""
     found = [load_card(name) for name in cards()]
     rows = [(card.id, _HOW[e.status], e.at or "", e.note or "") for card in found if (e := card.data.evidence.get(EMULATION))]
-    lines = ["| card | verified | by |", "| --- | --- | --- |"]
-    lines += [f"| {name} | {how} | {'. '.join(filter(None, (at, note)))} |" for name, how, at, note in sorted(rows, key=_order)]
+    lines = ["", "| card | verified | what | by |", "| --- | --- | --- | --- |"]
+    lines += [f"| {' | '.join(row)} |" for row in sorted(rows, key=_order)]
     lines += ["", "## What is assumed of the scan", ""]
     lines += [
-        "Rules, windup, transfers, faults and arithmetic that no source states, card by card; `pidemu show CARD` has all of a card's assumptions.",
+        "Rules, windup, transfers, faults and arithmetic that no source states; `pidemu show CARD` lists all that a card assumes.",
         "",
     ]
     for card in found:

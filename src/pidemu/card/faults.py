@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -74,7 +75,9 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
             return "missing key 'scheme'"
         case "string_type":
             return f"{shown} is not a text; put it in quotes if it is meant as one"
-        case "float_type" | "float_parsing" | "int_type" | "int_parsing":
+        case "int_type" | "int_from_float":
+            return f"{shown} is not a whole number"
+        case "float_type" | "float_parsing" | "int_parsing":
             return f"{shown} is not a number"
         case "bool_type" | "bool_parsing":
             return f"{shown} is neither true nor false"
@@ -96,6 +99,7 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
 
 
 def _not_one_of(shown: str, word: str, expected: str) -> str:
+    expected = re.sub(r"<\w+\.\w+: ('[^']*')>", r"\1", expected)
     options = [w.strip("' ") for w in expected.replace(" or ", ", ").split(",")]
     return f"{shown} is not one of {expected}{suggest(word, options)}"
 

@@ -11,6 +11,7 @@ from typing import Final
 
 from pidemu.card.load import Variant, dotted, variants
 from pidemu.card.models import Derivative, Equation, Proportional, Rule
+from pidemu.card.references import BY_ROLE, references
 from pidemu.card.source import Path_
 from pidemu.checks import stages
 from pidemu.errors import PidemuError, Problem, suggest
@@ -36,42 +37,11 @@ _NEUTRAL: Final = {
 }
 """Values that leave everything as it is."""
 
-_BY_ROLE: Final = (
-    "gain", "multiplier", "integral", "derivative", "bias", "process-gain", "process-time", "process-delay", "closed-loop-time",
-)  # fmt: skip
-"""Roles that need no field to name them."""
 _OF_TERMS: Final = ("gain", "multiplier", "integral", "derivative", "bias")
 _OF_THE_PROCESS: Final = ("process-gain", "process-time", "process-delay", "closed-loop-time")
 _RATES: Final = ("output-rate", "setpoint-rate")
 _WORDS: Final = {"tracking-time": ("Ti", "sqrt(Ti Td)"), "integral-limit": ("output",)}
 """Words that stand where a setting's name could."""
-_REFERENCES: Final = (
-    (("proportional", "weight"), "proportional-weight"),
-    (("cascade", "proportional", "weight"), "proportional-weight"),
-    (("derivative", "weight"), "derivative-weight"),
-    (("derivative", "filter", "ratio"), "filter-ratio"),
-    (("derivative", "filter", "gain"), "filter-gain"),
-    (("derivative", "filter", "time"), "filter-time"),
-    (("integral", "windup", "tracking_time"), "tracking-time"),
-    (("integral", "limits", "low"), "integral-limit"),
-    (("integral", "limits", "high"), "integral-limit"),
-    (("integral", "deadband"), "deadband"),
-    (("setpoint", "filter", "time"), "filter-time"),
-    (("setpoint", "filter", "factor"), "filter-factor"),
-    (("setpoint", "rate"), "setpoint-rate"),
-    (("measurement", "filter", "time"), "filter-time"),
-    (("measurement", "filter", "factor"), "filter-factor"),
-    (("error", "filter", "time"), "filter-time"),
-    (("error", "filter", "factor"), "filter-factor"),
-    (("error", "band"), "deadband"),
-    (("error", "gain"), "gap-gain"),
-    (("error", "linearity"), "linearity"),
-    (("feedforward", "gain"), "feedforward-gain"),
-    (("output", "rate"), "output-rate"),
-    (("output", "deadband"), "deadband"),
-    (("output", "resolution"), "resolution"),
-)
-"""Fields that may name a setting, and what that setting must set."""
 
 
 def reject_bad_units(variant: Variant) -> Iterator[Problem]:
@@ -161,7 +131,7 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
 def reject_bad_references(variant: Variant) -> Iterator[Problem]:
     """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
     equation, document = variant.equation, variant.card.document
-    for path, name, role in _references(equation):
+    for path, name, role in references(equation):
         if isinstance(name, float):
             wrong = _wrong_number(str(path[-1]), role, name)
             if wrong is not None:
@@ -190,19 +160,9 @@ def _wrong_number(field: str, role: str, x: float) -> str | None:
 
 def _used(equation: Equation) -> Iterator[object]:
     """Yield the settings that an equation uses: by a field that names them, or by their role."""
-    yield from (name for _, name, _ in _references(equation))
+    yield from (name for _, name, _ in references(equation))
     off = {"integral": equation.integral.on == "none", "derivative": equation.derivative.on == "none"}
-    yield from (n for n, s in equation.settings.items() if s.sets in _BY_ROLE and not off.get(s.sets, False))
-
-
-def _references(equation: Equation) -> Iterator[tuple[Path_, object, str]]:
-    """Yield every field that may name a setting: its path, its value and the role that the setting must have."""
-    for path, role in _REFERENCES:
-        part: object = equation
-        for key in path:
-            part = getattr(part, key, None)
-        if part is not None:
-            yield tuple(key.replace("_", "-") for key in path), part, role
+    yield from (n for n, s in equation.settings.items() if s.sets in BY_ROLE and not off.get(s.sets, False))
 
 
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:

@@ -8,9 +8,10 @@ from typing import Final
 
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.models import Canonical
+from pidemu.card.references import is_active
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
-from pidemu.settings import Settings, is_active, limits, off_values
+from pidemu.settings import Settings, limits, off_values
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
 """Examples are printed with six digits."""

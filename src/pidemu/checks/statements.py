@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from pidemu.card.load import Card, dotted, leaves, variants
+from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
 from pidemu.card.models import Status
 from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
@@ -68,7 +68,7 @@ def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
     """An evidence path leads to something in the card."""
     known = {dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1)}
     for key in card.data.evidence:
-        if key not in known:
+        if key not in known and key != EMULATION:
             yield card.document.problem(("evidence", key), f"nothing at '{key}' in this card{suggest(key, known)}", at_key=True)
 
 

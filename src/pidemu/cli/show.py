@@ -15,10 +15,11 @@ from pidemu.card.behaviour import mode_rows, scan_rows
 from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
 from pidemu.card.models import Evidence, Example, Setting
+from pidemu.card.references import is_active
 from pidemu.card.text import equation_heading, equation_lines
 from pidemu.cli.common import assignments, heading, json_option, number, print_json, vendors_option, wrapped
 from pidemu.plain import json_safe
-from pidemu.settings import is_active, off_values
+from pidemu.settings import off_values
 
 _WIDTH: Final = 110
 _LEAST: Final = 36

@@ -12,8 +12,9 @@ from pidemu.algorithm import Algorithm
 from pidemu.canonical import gain_sign
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Form, Setting
+from pidemu.card.references import is_active
 from pidemu.errors import SettingError
-from pidemu.settings import Settings, is_active, limits, off_values, spans_of
+from pidemu.settings import Settings, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
 FilterKind = Literal["none", "time", "ratio", "gain"]

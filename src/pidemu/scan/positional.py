@@ -68,7 +68,7 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
         needed = scheme.state(blocks.difference(scheme.total(t.u if feed is None else t.u - feed), P, t.D))
         I = scheme.term(_integral(b, a, t, needed, scheme, P, state, grown, moved))  # noqa: E741
     elif bias:
-        I = b.coefficient("bias", bias, "output at zero error", "%")  # noqa: E741
+        I = scheme.total(b.coefficient("bias", bias, "output at zero error", "%"))  # noqa: E741
     inner = blocks.summed([P, I])
     if a.windup == "recompute" and a.gate.without_derivative and not a.ki:
         inner = b.let("PI", scheme.total(blocks.limited(scheme.output(inner), t.low, t.high)), "P within the limits (section 5)")
@@ -261,7 +261,8 @@ def _after_output(
         beyond = (v >= t.high) | (v <= t.low)
         b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
     if a.windup == "reset-outside-band":
-        reach = blocks.magnitude(scheme.output(P if a.b == 1 else t.signals.e * b.coefficient("kp_band", a.kp, "gain", "%/%")))
+        gain = scheme.gain if scheme.gain is not None else b.coefficient("kp_band", a.kp, "proportional gain", "%/%")
+        reach = blocks.magnitude(gain * t.signals.e)
         b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if forward:
         assert grown is not None
