@@ -1,4 +1,6 @@
-"""What a scan of a settled loop costs after a million scans, against the first ten thousand: states must not decay into denormal numbers.
+"""What a scan of a settled loop costs after a million scans, against the first ten thousand.
+
+States must not decay into denormal numbers.
 
 Run with ``python benchmarks/settled.py [CARD...]``; by default every card. The ratio should be 1.
 """

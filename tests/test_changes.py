@@ -218,6 +218,13 @@ def test_a_controller_that_becomes_positional_or_incremental_goes_on_from_its_ou
     assert ctl.scan(54.0, 51.0) - before == pytest.approx(0.75, rel=1e-12)
 
 
+def test_a_loaded_sum_without_integral_action_is_what_the_output_leaves_when_it_comes_to_be() -> None:
+    loads = option(INCREMENTAL | {"transfer": {"start": "bumpless"}}, {}, transfer={"start": "load-output"})
+    ctl = bench({"kp": 2.0}, **loads)
+    assert settled(ctl, KIND="other") == (0.0, 0.0)
+    assert ctl.scan(56.0, 51.0) == 46.0 + 4.0
+
+
 @pytest.mark.parametrize("change", [{"rule": "forward"}, {"rule": "trapezoidal"}, {"windup": {"scheme": "conditional"}}], ids=str)
 def test_another_rule_or_windup_scheme_goes_on_from_the_same_integral(change: dict[str, Any]) -> None:
     ctl = bench(DEFAULTS, **option({}, {"integral": change}))

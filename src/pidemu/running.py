@@ -145,6 +145,9 @@ class Running:
     def _left_for_the_integral(self, last: Mapping[str, float], u: float) -> float:
         """Return the integral with which the output stays where it is."""
         other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        if "I" not in other:  # a loaded sum without integral action
+            self["I"] = 0.0
+            return u - self.would_be(last, "v")
         for name in other.named().keys() & self.named().keys():
             other[name] = self[name]
         for name in {"on", "begun"} & other.named().keys():

@@ -61,7 +61,11 @@ def stepped(b: Builder, a: Algorithm, t: Terms, out: Expr) -> Expr:
     """Return the output behind deadband and resolution: what the rest of the controller does not see (sections 7 and 8)."""
     if a.output_deadband:
         width = b.coefficient("u_band", a.output_deadband, "output deadband", "%")
-        out = b.let("out_d", select(blocks.magnitude(out - t.u) > width, out, t.u), "output deadband (section 8)")
+        out = b.let(
+            "out_d",
+            select(blocks.magnitude(out - t.u) > width, out, blocks.limited(t.u, t.low, t.high)),
+            "output deadband (section 8)",
+        )
     if a.resolution:
         step = b.coefficient("u_step", a.resolution, "output resolution", "%")
         out = b.let("out_s", blocks.limited(blocks.rounded(out, step), t.low, t.high), "output resolution (section 7)")

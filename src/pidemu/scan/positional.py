@@ -64,7 +64,7 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
     if holds_sum:
         state = b.state("I", "integral sum")
         grown = _growth(b, a, h, t) if a.ki else None
-        grown = _gated(b, a, t, scheme, P, state, grown, last if a.start == "running" else t.u)
+        grown = _gated(b, a, t, scheme, P, state, grown, last if a.start == "running" else t.u, feed)
         needed = scheme.state(blocks.difference(scheme.total(t.u if feed is None else t.u - feed), P, t.D))
         I = scheme.term(_integral(b, a, t, needed, scheme, P, state, grown, moved))  # noqa: E741
     elif bias:
@@ -72,6 +72,8 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
     inner = blocks.summed([P, I])
     if a.windup == "recompute" and a.gate.without_derivative and not a.ki:
         inner = b.let("PI", scheme.total(blocks.limited(scheme.output(inner), t.low, t.high)), "P within the limits (section 5)")
+    if I is not None:
+        b.let("I_kept", Name("I"), "integral before what comes after the output")
     total = scheme.output(blocks.summed([inner, t.D]))
     if feed is not None and not a.feedforward_after:
         v: Expr = b.let("v", total + feed, "sum of the terms, with the feedforward (section 6)")
@@ -87,8 +89,8 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
         nothing = blocks.limited(expr(0.0), t.low, t.high)
         final = b.let("out_1", select(b.fresh, nothing, final), "the first scan only prepares the block (section 6)")
     if holds_sum and a.ki:
-        _after_output(b, a, h, t, scheme, P, v, out, grown)
-        _in_manual(b, a, t, scheme, P, manual)
+        _after_output(b, a, h, t, scheme, P, v, out, grown, feed)
+        _in_manual(b, a, t, scheme, P, manual if feed is None else manual - feed)
     if last is not t.u:
         b.let(last.id, out if a.start == "running" else select(b.automatic, out, manual), "output as the algorithm knows it")
     if a.windup == "freeze" and a.gate.without_derivative and a.ki:
@@ -129,7 +131,9 @@ def _growth(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     return grown
 
 
-def _gated(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr | None, last: Name) -> Expr | None:
+def _gated(
+    b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr | None, last: Name, feed: Expr | None
+) -> Expr | None:
     """Stop or hasten the integral at a limit where the windup scheme says so (section 5)."""
     if grown is None or (a.windup not in ("freeze", "conditional") and a.gate.fast_return == 1):
         return grown
@@ -143,7 +147,8 @@ def _gated(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Nam
         return _frozen(b, a, t, state, grown, pushes, last)
     if a.windup == "conditional":
         ahead = state if a.integral_rule is Rule.FORWARD else state + grown
-        v0 = b.let("v0", scheme.output(blocks.summed([P, scheme.term(ahead), t.D])), "sum with this increment")
+        total = scheme.output(blocks.summed([P, scheme.term(ahead), t.D]))
+        v0 = b.let("v0", total if feed is None else total + feed, "sum with this increment")
         if a.gate.by_output_sign:
             stop = blocks.saturated_by_sign(v0, t.low, t.high, t.signals.e if b.sign > 0 else 0.0 - t.signals.e)
         else:
@@ -240,7 +245,7 @@ def _limits(b: Builder, a: Algorithm, t: Terms) -> tuple[Expr, Expr]:
 
 
 def _after_output(
-    b: Builder, a: Algorithm, h: float, t: Terms, scheme: _Sum, P: Expr, v: Expr, out: Expr, grown: Expr | None
+    b: Builder, a: Algorithm, h: float, t: Terms, scheme: _Sum, P: Expr, v: Expr, out: Expr, grown: Expr | None, feed: Expr | None
 ) -> None:
     """Do what is done to the integral after the output (section 5)."""
     state = Name("I")
@@ -256,7 +261,7 @@ def _after_output(
             pulled = select(Name("i_still") > 0.0, state, pulled)
         b.let("I", pulled, f"{a.windup}, Tt = {a.tracking_time:.6g} s (section 5)")
     if a.windup == "recompute" and not a.gate.without_derivative:
-        _recomputed(b, a, t, scheme, P, t.D, state)
+        _recomputed(b, a, t, scheme, P, t.D, state, feed)
     if a.windup == "freeze" and a.gate.this_scan:
         beyond = (v >= t.high) | (v <= t.low)
         b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
@@ -266,6 +271,9 @@ def _after_output(
         b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if forward:
         assert grown is not None
+        if a.first_scan_holds:
+            going = equal(b.state("begun", "there has been a scan", "-"), 1.0) if a.start == "running" else t.on
+            grown = select(going, grown, 0.0)
         b.let("I", state + grown, "integral, after the output: forward (section 4)")
         if a.integral_limits is not None:
             low, high = _limits(b, a, t)
@@ -282,11 +290,14 @@ def _share(a: Algorithm, h: float) -> float:
     return h / (a.tracking_time + h) if implicit else h / a.tracking_time
 
 
-def _recomputed(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, D: Expr | None, state: Name) -> None:
+def _recomputed(
+    b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, D: Expr | None, state: Name, feed: Expr | None = None
+) -> None:
     """At a limit set the integral to what the limit leaves for it; with D ``None`` before the derivative is added (section 5)."""
-    total = b.let("v_I", scheme.output(blocks.summed([P, scheme.term(state), D])), "sum that is held against the limits")
-    high = scheme.state(blocks.difference(scheme.total(t.high), P, D))
-    low = scheme.state(blocks.difference(scheme.total(t.low), P, D))
+    sum_of_terms = scheme.output(blocks.summed([P, scheme.term(state), D]))
+    total = b.let("v_I", sum_of_terms if feed is None else sum_of_terms + feed, "sum that is held against the limits")
+    high = scheme.state(blocks.difference(scheme.total(blocks.difference(t.high, feed)), P, D))
+    low = scheme.state(blocks.difference(scheme.total(blocks.difference(t.low, feed)), P, D))
     new = select(total >= t.high, high, select(total <= t.low, low, state))
     b.let("I", select(b.fresh, state, new) if a.zero_first_output else new, "recompute: what the limit leaves (section 5)")
     if a.gate.clamped:
@@ -299,5 +310,7 @@ def _in_manual(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, manual
         state = Name("I")
         needed = scheme.state(blocks.difference(scheme.total(manual), P, t.D))
         b.let("I", select(b.automatic, state, needed), "in manual the integral tracks the output (section 6)")
+    if a.start == "keep" or (a.start == "load-output" and a.first_scan_holds):
+        b.let("I", select(b.automatic, Name("I"), Name("I_kept")), "the integral stands still in manual (section 6)")
     if a.start == "zero":
         b.let("I", select(b.automatic, Name("I"), 0.0), "no integral in manual (section 6)")
