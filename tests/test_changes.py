@@ -125,6 +125,19 @@ def test_a_velocity_controller_adds_increments_of_its_new_gains_to_the_output_th
     assert ctl.scan(55.0, 51.0) - before == pytest.approx(5.0 + 0.5 * 4, rel=1e-13)
 
 
+@pytest.mark.parametrize("fields", [{}, INCREMENTAL], ids=["positional", "velocity"])
+def test_whole_numbers_as_arguments_do_not_make_whole_numbers_of_the_states(fields: dict[str, Any]) -> None:
+    chosen = made_up_card(**fields).settings(kp=2, ki=0.25)
+    whole, real = (Controller(chosen, 1, output_limits=(0, 100), initial_output=u) for u in (40, 40.0))
+    for ctl in (whole, real):
+        ctl.run(*RUN)
+        ctl.change(ki=0.5)
+    assert whole.state == real.state
+    whole.reset()
+    whole.start(u=12.5)
+    assert whole.output == 12.5
+
+
 # --- changes that are made bumpless ----------------------------------------------------------------------------------
 
 
@@ -166,12 +179,24 @@ def test_an_integral_that_is_switched_on_goes_on_from_the_output(start: str, der
     assert ctl.scan(54.0, 51.0) == pytest.approx(6.0, abs=0.75)  # with this scan's 0.25 times 3, or one scan later
 
 
-def test_an_integral_that_is_switched_off_leaves_its_output_and_comes_back_as_the_output_is() -> None:
+def test_an_integral_that_is_switched_off_stays_as_a_constant_and_comes_back_as_the_output_is() -> None:
     ctl = bench(DEFAULTS)
+    before = ctl.output
+    ctl.change(ki=0)
+    assert [ctl.scan(54.0, 51.0), ctl.scan(54.0, 51.0)] == [before, before]
+    ctl.change(kp=3.0)
+    assert ctl.scan(54.0, 51.0) == pytest.approx(before + 3.0)
+    ctl.change(ki=0.25)
+    assert ctl.scan(54.0, 51.0) == pytest.approx(before + 3.0, abs=0.75)
+    ctl.reset()
+    ctl.change(ki=0)
+    assert ctl.scan(54.0, 51.0) == 9.0
+
+
+def test_an_integral_that_is_switched_off_is_gone_where_the_card_says_so() -> None:
+    ctl = bench(DEFAULTS, transfer={"start": "bumpless", "without-integral": "zero"})
     ctl.change(ki=0)
     assert ctl.scan(54.0, 51.0) == 6.0
-    ctl.change(ki=0.25)
-    assert ctl.scan(54.0, 51.0) == pytest.approx(6.0, abs=0.75)
 
 
 @pytest.mark.parametrize("transfer", [{"derivative": "running"}, {"derivative": "restarted"}, {"derivative": "zeroed"}], ids=str)

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
         UnitError,
     )
     from pidemu.law import Law
+    from pidemu.record.files import Record, read_record
     from pidemu.settings import Settings
+    from pidemu.signals import Event
 
 __version__ = "0.1.0"
 
@@ -44,7 +46,10 @@ _HOMES = {
     "ScanError": "errors",
     "SettingError": "errors",
     "UnitError": "errors",
+    "Event": "signals",
     "Law": "law",
+    "Record": "record.files",
+    "read_record": "record.files",
     "Settings": "settings",
 }
 
@@ -55,8 +60,10 @@ __all__ = [
     "Controller",
     "Conversion",
     "ConversionRefusedError",
+    "Event",
     "Law",
     "PidemuError",
+    "Record",
     "RecordError",
     "ScanError",
     "SettingError",
@@ -67,6 +74,7 @@ __all__ = [
     "compare",
     "convert",
     "load_card",
+    "read_record",
 ]
 
 

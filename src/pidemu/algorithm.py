@@ -181,8 +181,8 @@ class Algorithm:
         P on PV is accumulated from its value at the start.
     start : str
         What the integral does at the transfer to automatic (specs/equations.md, section 6).
-    keeps_load : bool
-        With ``start="load-output"`` and no integral action, the sum keeps what it was loaded with.
+    keeps_integral : bool
+        Without integral action the integral stays as it is, a constant: what was loaded, or what it held when it was switched off.
     first_scan_holds : bool
         The integral does not grow in the first automatic scan.
     loads_as_it_is : bool
@@ -258,7 +258,7 @@ class Algorithm:
     reads_back: bool = False
     accumulated: bool = False
     start: Start = "bumpless"
-    keeps_load: bool = True
+    keeps_integral: bool = True
     first_scan_holds: bool = False
     loads_as_it_is: bool = False
     zero_power_up: bool = False
@@ -308,6 +308,19 @@ class Algorithm:
         """``kd/kp`` [s]: the derivative time that the integral of the series form sees."""
         none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
         return 0.0 if none else self.kd / self.kp
+
+    def too_coarse(self, h: float) -> list[str]:
+        """What a scan interval `h` [s] is too long for, in words: rules that ring or overshoot there, though they are stable."""
+        found = []
+        rule = self.derivative_rule if self.has_term_filter else self.filter_rule if self.has_signal_filter else None
+        if rule is Rule.TRAPEZOIDAL and 0 < self.Tf < h / 2:
+            found.append(f"the filter time of {self.Tf:.3g} s is less than half of it, and the trapezoidal rule rings")
+        explicit = self.windup == "back-calculation" and not self.implicit_tracking and self.ki
+        if explicit and 0 < self.tracking_time < h:
+            found.append(f"the tracking time of {self.tracking_time:.3g} s is less, and back-calculation overshoots")
+        if self.ki and self.kp and abs(self.kp / self.ki) < h:
+            found.append(f"the integral time of {abs(self.kp / self.ki):.3g} s is less")
+        return found
 
     @property
     def beyond_the_law(self) -> list[str]:

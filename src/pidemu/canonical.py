@@ -218,7 +218,7 @@ def _transfer(equation: Equation) -> dict[str, Any]:
     t = equation.transfer
     return {
         "start": t.start,
-        "keeps_load": t.without_integral == "kept",
+        "keeps_integral": t.without_integral == "kept",
         "first_scan_holds": t.first_scan == "holds",
         "loads_as_it_is": t.loaded == "as-it-is",
         "zero_power_up": t.power_up == "zero",

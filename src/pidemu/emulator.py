@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite, isinf, isnan, nan
 from typing import TYPE_CHECKING, Literal
 
@@ -11,7 +12,8 @@ import numpy.typing as npt
 
 from pidemu.canonical import default_scan
 from pidemu.card.models import Faults
-from pidemu.errors import ScanError, suggest
+from pidemu.doubtful import bad_signal, usable_interval
+from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.running import Running, resting
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
@@ -100,7 +102,8 @@ class Controller:
         self.events: list[Event] = []
         self._action: Action = "reverse" if settings.equation.action.fixed else action
         self._limits = _pair(settings.equation.output.limits if output_limits is None else output_limits)
-        self._bias, self._initial_output = bias, initial_output
+        self._bias, self._initial_output = float(bias), float(initial_output)
+        self._kept = 0.0  # what an integral held that was switched off while running
         self._signals: tuple[str, ...] = ()
         self._mode: Mode = "power-up"
         self._count = 0
@@ -121,12 +124,13 @@ class Controller:
 
         def make(h: float, *, at_rest: bool = False) -> Program:
             a = settings.algorithm(own_units=True, scan=h)
+            alone = not (a.ki or a.velocity or a.dahlin)
             return build(
                 resting(a) if at_rest else a,
                 h,
                 action=self._action,
                 limits=self._limits,
-                bias=self._bias,
+                bias=self._bias + self._kept if alone else self._bias,
                 initial_output=self._initial_output,
                 signals=self._signals,
                 title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
@@ -155,6 +159,9 @@ class Controller:
 
     def reset(self) -> None:
         """Go back to before the first scan; the settings stay."""
+        if self._kept:
+            self._kept = 0.0
+            self._use(self.settings, self._running_with(self.settings))
         self._running.reset()
         self._mode, self._count, self._last = "power-up", 0, ()
         self.events.clear()
@@ -190,6 +197,30 @@ class Controller:
         for name, value in (running | states).items():
             self._running[name] = value
 
+    def rest(self, sp: float, pv: float, output: float) -> None:
+        """Start at rest, as if the controller had been in automatic with these signals and this output for ever.
+
+        Parameters
+        ----------
+        sp, pv : float
+            Setpoint and measurement, as in `scan`.
+        output : float
+            The output [as output limits].
+
+        Raises
+        ------
+        ScanError
+            There has been a scan, or a value is not a finite number.
+        """
+        if self._count:
+            raise ScanError(f"a controller starts at rest before the first scan, and there have been {self._count}; reset() first")
+        if not (isfinite(sp) and isfinite(pv) and isfinite(output)):
+            raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers")
+        last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
+        self._running.take_over({"u": float(output)}, last)
+        self._mode, self._last = "automatic", self._running.inputs(last)
+        self._know_the_everyday_scan()
+
     def change(self, settings: Settings | Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Change settings while running, as the real controller takes it (specs/equations.md, section 6).
 
@@ -216,10 +247,19 @@ class Controller:
             A setting is unknown or out of range; the old ones stay in force.
         """
         old = self.settings
-        new = settings if isinstance(settings, Settings) else old.changed({**(settings or {}), **values})
+        if isinstance(settings, Settings):
+            new = settings.changed(values) if values else settings
+        else:
+            new = old.changed({**(settings or {}), **values})
         if new.card.id != old.card.id:
             raise ScanError(f"the controller runs {old.card.id}; settings of {new.card.id} need a controller of their own")
-        before, after = self._running, self._running_with(new)
+        before, constant = self._running, self._kept
+        self._kept = self._constant_left_by(new)
+        try:
+            after = self._running_with(new)
+        except PidemuError:
+            self._kept = constant
+            raise
         last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
         weights = (old.algorithm().c, new.algorithm().c)
         other_signal = weights[0] != weights[1]  # what the derivative remembers is another signal's
@@ -234,6 +274,17 @@ class Controller:
             self.events.append(Event(self._count, "settings", ", ".join(changed) or "no change", bump))
         self._use(new, after)
         return new
+
+    def _constant_left_by(self, new: Settings) -> float:
+        """Return what the integral leaves behind where new settings switch it off and the card keeps it."""
+        old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
+        if a.ki or a.velocity or not a.keeps_integral or (a.start == "load-output" and a.keeps_integral):
+            return 0.0
+        if not old.ki or "I" not in self._running:
+            return self._kept
+        sign = 1.0 if self._action == "reverse" else -1.0
+        scale = {"ki e": 1.0, "e/Ti": sign * a.kp, "e": 0.0}[old.holds]
+        return scale * self._running["I"]
 
     def scan(
         self,
@@ -269,7 +320,8 @@ class Controller:
         feedforward : float, optional
             Feedforward signal, for cards that have one [as output limits].
         hold : bool
-            Nothing is computed and the output stands; the scan after it is a transfer.
+            Nothing is computed and the output stands. The next scan in automatic is a transfer as the card makes it
+            (``transfer.start``): bumpless with most, with the real one's bump where the setpoint has moved meanwhile with others.
         interval : float, optional
             Time since the last scan [s]; by default the nominal one. It counts with cards that measure it (``scan.interval:
             measured``).
@@ -285,13 +337,15 @@ class Controller:
             The manual output is infinite, the card has no use for a signal, or it refuses the interval.
         """
         everyday = self._plain and auto is True and manual is None and interval is None and not hold
+        everyday = everyday and type(sp) is float and type(pv) is float
         if everyday and cascade is track is external_reset is feedforward is None and isfinite(sp) and isfinite(pv):
             self._last = (sp, pv, 1.0, nan)
             self._count += 1
             return self._scan(self._state, sp, pv, 1.0, nan)
         signals = (cascade, track, external_reset, feedforward)
         given = {name: float(x) for name, x in zip(SIGNALS, signals, strict=True) if x is not None}
-        return self._any_scan(sp, pv, auto, nan if manual is None else manual, given, hold, interval)
+        by_hand = nan if manual is None else float(manual)
+        return self._any_scan(float(sp), float(pv), auto, by_hand, given, hold, None if interval is None else float(interval))
 
     def _any_scan(
         self, sp: float, pv: float, auto: bool, by_hand: float, given: Mapping[str, float], hold: bool, interval: float | None
@@ -306,14 +360,11 @@ class Controller:
             absent(s) if s == "feedforward" and given.get(s) != given.get(s) else given.get(s, absent(s)) for s in self._names
         )
         inputs = (sp, pv, 1.0 if auto else 0.0, by_hand, *signals)
-        mode, compiled = mode_of(auto, given), self._running.compiled
+        mode = mode_of(auto, given)
         bad = not (isfinite(sp) and isfinite(pv)) or isinf(given.get("cascade", nan))
         if hold or interval is not None or bad:
-            found = self._odd(mode, inputs, hold, interval)
-            if isinstance(found, float):
-                return found
-            compiled = found
-        return self._scanned(compiled, mode, inputs)
+            return self._odd_scan(mode, inputs, hold, interval)
+        return self._scanned(self._running.compiled, mode, inputs)
 
     def _scanned(self, compiled: Compiled, mode: Mode, inputs: tuple[float, ...]) -> float:
         """Do one scan and note a change of mode."""
@@ -339,13 +390,8 @@ class Controller:
 
     def _read(self, extra: Mapping[str, object]) -> None:
         """Make the program read signals that it did not read so far."""
-        a = self.settings.algorithm()
-        if "external_reset" in extra and a.windup != "external-reset" and not a.reads_back:
-            raise ScanError(
-                f"{self.settings.card.id} takes no external reset: its windup scheme is '{a.windup}'; leave the signal out"
-            )
-        if "feedforward" in extra and a.feedforward is None:
-            raise ScanError(f"{self.settings.card.id} states no feedforward input; leave the signal out")
+        for reason in self.settings.without_use_for(extra).values():
+            raise ScanError(f"{reason}; leave the signal out")
         wanted = tuple(program for argument, program in SIGNALS.items() if argument in extra or program in self._signals)
         if wanted != self._signals:
             self._signals, state = wanted, self.state
@@ -355,42 +401,40 @@ class Controller:
             self._use(self.settings, running)
             self._last = running.inputs(last) if last else ()
 
-    def _odd(self, mode: Mode, inputs: tuple[float, ...], hold: bool, interval: float | None) -> float | Compiled:
-        """Deal with a hold, a bad signal or an uneven interval: return the output, or the program that computes it."""
+    def _note(self, kind: Literal["signal", "interval"], text: str) -> None:
+        """Note what is wrong with a scan; the same in the scan before is one event with it."""
+        last = self.events[-1] if self.events else None
+        if last is not None and (last.kind, last.text) == (kind, text) and last.scan + last.scans == self._count:
+            self.events[-1] = replace(last, scans=last.scans + 1)
+        else:
+            self.events.append(Event(self._count, kind, text))
+
+    def _odd_scan(self, mode: Mode, inputs: tuple[float, ...], hold: bool, interval: float | None) -> float:
+        """Do a scan with a hold, a bad signal or an uneven interval."""
         if hold:
             return self._stand("hold", inputs)
         named = {"setpoint": inputs[0], "measurement": inputs[1]}
         if "cascade" in self._signals:
             remote = inputs[4 + self._names.index("cascade")]
             named["remote setpoint"] = 0.0 if isnan(remote) else remote  # none is none, and not a bad one
-        bad = [(name, value) for name, value in named.items() if not isfinite(value)]
-        policy = self._faults.signal
-        if bad:
-            name, value = bad[0]
-            done = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}[policy]
-            self.events.append(Event(self._count, "signal", f"{name} is {value}: {done}"))
-            if policy != "propagate":
-                instead = None if policy == "hold" or mode not in ("automatic", "cascade") else nan if policy == "nan" else 0.0
-                return self._stand(mode, inputs, instead)
-        if interval is None or self.settings.equation.scan.interval == "nominal":
-            return self._running.compiled
-        h = self._usable(interval)
-        return self._stand(mode, inputs) if h is None else self._running.at(h)
-
-    def _usable(self, interval: float) -> float | None:
-        """Return the interval that the card computes with [s]; ``None`` where it does nothing."""
-        faults, h = self._faults, interval
-        if h < 0 and faults.negative_interval == "refuse":
-            raise ScanError(f"{self.settings.card.id} refuses a scan interval of {h:g} s; give a positive one")
-        if h < 0 and faults.negative_interval == "zero":
-            self.events.append(Event(self._count, "interval", f"interval of {h:g} s: counted as 0"))
-            h = 0.0
-        if h == 0 and faults.zero_interval == "compute":
-            return 0.0
-        if h > 0 and isfinite(h):
-            return h
-        self.events.append(Event(self._count, "interval", f"interval of {interval:g} s: nothing computed, output held"))
-        return None
+        text, policy = bad_signal(self._faults, named), self._faults.signal
+        if text:
+            self._note("signal", text)
+        if text and policy != "propagate":
+            if mode in ("automatic", "cascade"):
+                return self._stand(mode, inputs, None if policy == "hold" else nan if policy == "nan" else 0.0)
+            if not self._last:
+                return self._stand(mode, inputs)
+            inputs = (*self._last[:2], *inputs[2:])  # the output is the operator's; the rest goes on with the last good signals
+        compiled = self._running.compiled
+        if interval is not None and self.settings.equation.scan.interval == "measured":
+            h, remark = usable_interval(self._faults, self.settings.card.id, interval)
+            if remark:
+                self._note("interval", remark)
+            if h is None:
+                return self._stand(mode, inputs)
+            compiled = self._running.at(h)
+        return self._scanned(compiled, mode, inputs)
 
     def _stand(self, mode: Mode, inputs: tuple[float, ...], instead: float | None = None) -> float:
         """Compute nothing: the output is the last one, or the operator's in manual, or `instead`; the state stands still."""
@@ -404,8 +448,9 @@ class Controller:
             if mode == "manual":
                 self._running["u"] = u = self._by_hand(u, moved=moved)
             u = self.output
+            a = self.settings.algorithm()
             for name, value in (("own", u), ("on", 0.0)):
-                if name in self._running:
+                if name in self._running and not (name == "own" and a.start == "running"):
                     self._running[name] = value
             if mode != self._mode:  # a transfer to automatic waits until something is computed
                 self._transfer(self._count, mode, u - was)
@@ -448,7 +493,7 @@ class Controller:
         hold : array_like of bool, shape (n,) or scalar, optional
             As in `scan`.
         interval : array_like, shape (n,) or scalar, optional
-            Time since the last scan [s], as in `scan`.
+            Time since the last scan [s], as in `scan`; NaN: the nominal one.
 
         Returns
         -------
@@ -477,7 +522,12 @@ class Controller:
         ):
             if bad.any():
                 raise ScanError(f"{name} in sample {np.flatnonzero(bad)[0]} (counted from 0)")
-        return self._run(signals, measured=interval is not None and self.settings.equation.scan.interval == "measured")
+        measured = interval is not None and self.settings.equation.scan.interval == "measured"
+        if measured:
+            steps = signals["interval"]
+            for i in np.flatnonzero(steps < 0):  # nothing is done where one is refused
+                usable_interval(self._faults, f"sample {i} (counted from 0): {self.settings.card.id}", float(steps[i]))
+        return self._run(signals, measured)
 
     def _run(self, signals: Mapping[str, Floats], measured: bool) -> Floats:
         modes = modes_of(signals)
@@ -491,17 +541,12 @@ class Controller:
             mode = MODES[modes[start]]
             if odd[start]:
                 for i in range(start, end):
-                    out[i] = self._odd_scan(mode, tuple(float(s[i]) for s in inputs), signals, i, measured)
+                    sample = tuple(float(s[i]) for s in inputs)
+                    h = float(signals["interval"][i]) if measured else None
+                    out[i] = self._odd_scan(mode, sample, bool(signals["hold"][i] > 0), h)
             else:
                 self._spell(mode, out[start:end], [s[start:end] for s in inputs])
         return out
-
-    def _odd_scan(self, mode: Mode, inputs: tuple[float, ...], signals: Mapping[str, Floats], i: int, measured: bool) -> float:
-        hold = bool(signals["hold"][i] > 0)
-        found = self._odd(mode, inputs, hold, float(signals["interval"][i]) if measured else None)
-        if isinstance(found, float):
-            return found
-        return self._scanned(found, mode, inputs)
 
     def _spell(self, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
@@ -511,8 +556,11 @@ class Controller:
         with self._running.quiet():
             out[:general] = compiled.run(self._state, *(s[:general].tolist() for s in inputs))
             if general < out.size:
-                wanted = {q.name for q in self.program.inputs} - {"auto", "manual", "track"}
-                tail = [s[general:].tolist() for q, s in zip(self.program.inputs, inputs, strict=True) if q.name in wanted]
+                tail = [
+                    s[general:].tolist()
+                    for q, s in zip(self.program.inputs, inputs, strict=True)
+                    if q.name in compiled.read_in_automatic
+                ]
                 rest = compiled.run_automatic(self._state, *tail)
                 out[general:] = np.fromiter(rest, float, len(rest))
         if mode != self._mode:

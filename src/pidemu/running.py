@@ -138,6 +138,7 @@ class Running:
     def _resting(self, last: Mapping[str, float], u: float) -> dict[str, float]:
         """Return the states of a controller that has had the last signals for ever, in manual."""
         other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        other["u"] = u
         with other.quiet():
             other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
         return other.named()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -224,6 +224,16 @@ class Settings(Mapping[str, Value]):
         from pidemu.canonical import algorithm_of  # numbers are made from settings, not settings from numbers
 
         return algorithm_of(self, own_units=own_units, scan=scan)
+
+    def without_use_for(self, signals: Iterable[str]) -> dict[str, str]:
+        """Return why the card has no use for signals, by signal: ``"external_reset"`` and ``"feedforward"`` need a place to go."""
+        a = self.algorithm()
+        reasons = {}
+        if "external_reset" in signals and a.windup != "external-reset" and not a.reads_back:
+            reasons["external_reset"] = f"{self.card.id} takes no external reset: its windup scheme is '{a.windup}'"
+        if "feedforward" in signals and a.feedforward is None:
+            reasons["feedforward"] = f"{self.card.id} states no feedforward input"
+        return reasons
 
     def law(self, scan: float | None = None) -> Law:
         """Return the linear law (specs/equations.md, section 2).

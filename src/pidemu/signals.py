@@ -44,12 +44,15 @@ class Event:
         What happened.
     bump : float
         What the output moved by in this scan [as output limits]; for `settings`, how much further than without the change.
+    scans : int
+        For how many scans in a row, from `scan` on.
     """
 
     scan: int
     kind: Literal["transfer", "settings", "signal", "interval"]
     text: str
     bump: float = 0.0
+    scans: int = 1
 
 
 def absent(signal: str) -> float:

@@ -84,7 +84,9 @@ def test_a_refused_interval_names_the_file() -> None:
     library = pidemu.load_card("ros/control-toolbox").settings(p=1, i=0, d=0)
     record = still(4, interval=of(1, 1, -1, 1))
     found = timing(record, "r.csv", None, library)
-    with pytest.raises(RecordError, match=r"^r\.csv: ros/control-toolbox refuses a scan interval of -1 s"):
+    with pytest.raises(
+        RecordError, match=r"^r\.csv: sample 2 \(counted from 0\): ros/control-toolbox refuses a scan interval of -1 s"
+    ):
         play(pidemu.Controller(library, found.scan), record, "r.csv", found.interval)
 
 

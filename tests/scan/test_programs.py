@@ -276,7 +276,9 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
     h = data.draw(scans_of(a))
     if a.start == "load-output" or (a.ki == 0 and not a.velocity and a.dahlin is None):  # bumped by P + D, as in the field
         x = record(seed, modes=True)
-        a = replace(linear(a), kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_load=True, holds="ki e", manual_output="operator")
+        a = replace(
+            linear(a), kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_integral=True, holds="ki e", manual_output="operator"
+        )
         u = run(build(a, h, initial_output=30.0), x)
         assert all(u[n] == u[n - 1] for n in starts_in_automatic(x))
     elif a.start == "bumpless":

@@ -106,8 +106,13 @@ def conditional_by_sign(x: Scan) -> tuple[float, float]:
 
 def freeze_with_fast_return(x: Scan) -> tuple[float, float]:
     stopped = (x.u == HIGH and x.dI > 0) or (x.u == LOW and x.dI < 0)
-    returns = (x.u == HIGH and x.dI < 0) or (x.u == LOW and x.dI > 0)
-    I = x.I + (0.0 if stopped else 16 * x.dI if returns else x.dI)  # noqa: E741
+    before = x.P + x.I + x.D
+    dI = x.dI
+    if before + dI > HIGH and dI < 0:
+        dI = max(16 * dI, HIGH - before)
+    elif before + dI < LOW and dI > 0:
+        dI = min(16 * dI, LOW - before)
+    I = x.I + (0.0 if stopped else dI)  # noqa: E741
     return clip(x.P + I + x.D), I
 
 
@@ -207,8 +212,7 @@ def test_the_way_back_from_a_limit_is_sixteen_times_as_fast(scheme: Scheme) -> N
     a = Algorithm(series=False, kp=10.0, ki=0.01, kd=0.0, b=0.0, windup=scheme, tracking_time=1e9)  # no cut-off is taken out
     slow, fast = (np.diff(states_of(program(replace(a, gate=Gate(fast_return=f))), sp, pv, "I")[0]) for f in (1.0, 16.0))
     assert slow == pytest.approx([-0.05] * 3, rel=1e-5)  # 0.01 times 0.5 s times an error of -10; 1e-7 of the cut-off are taken out
-    # the output reaches the limit in the second scan, so the third is the first one on the way back
-    assert fast == pytest.approx([-0.05, -0.8, -0.8], rel=1e-5)
+    assert fast == pytest.approx([-0.8, -0.8, -0.8], rel=1e-5)
 
 
 # --- tracking times and limits as cards state them -------------------------------------------------------------------

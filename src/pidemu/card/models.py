@@ -263,8 +263,7 @@ class WindupGate(Model):
     )
     fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
         default=1.0,
-        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by "
-        "this.",
+        description="While the sum is beyond a limit and the integral on its way back, the integral time is divided by this.",
     )
 
 
@@ -316,8 +315,7 @@ class WindupExternalReset(Model):
     )
     fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
         default=1.0,
-        description="While the last output is at a limit and the integral is on its way back, the integral time is divided by "
-        "this.",
+        description="While the sum is beyond a limit and the integral on its way back, the integral time is divided by this.",
     )
 
 
@@ -478,7 +476,8 @@ class Transfer(Model):
     )
     without_integral: Literal["kept", "zero"] = Field(
         default="kept",
-        description="With `load-output` and the integral switched off: the sum keeps what it was loaded with, or is zero.",
+        description="With the integral switched off: what it holds stays as a constant (with `load-output` what was loaded, "
+        "otherwise what it held when it was switched off while running), or is zero.",
     )
     first_scan: Literal["integrates", "holds"] = Field(
         default="integrates",

@@ -176,8 +176,8 @@ def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, message, at_key=True)
     if t.first_scan == "holds" and t.start in ("bumpless", "tracked"):
         yield document.problem(home, f"'first-scan' has no meaning with start '{t.start}'", at_key=True)
-    if t.start != "load-output" and (t.loaded != "limited" or t.without_integral != "kept"):
-        yield document.problem(home, "'loaded' and 'without-integral' belong to start 'load-output'", at_key=True)
+    if t.start != "load-output" and t.loaded != "limited":
+        yield document.problem(home, "'loaded' belongs to start 'load-output'", at_key=True)
     if t.changes == "bumpless" and equation.integral.holds != "ki e":
         yield document.problem(home, "'changes: bumpless' needs an integral that holds 'ki e'", at_key=True)
     if t.manual_output == "gain-times-operator" and not equation.action.fixed:

@@ -24,19 +24,13 @@ def happened(playback: Playback) -> list[Row]:
     A first scan that moves nothing is nothing to tell.
     """
     rows: list[Row] = []
-    latest: dict[str, int] = {}
     for e in playback.events:
         if e.kind == "transfer":
             if e.text.startswith("power-up") and abs(e.bump) < NO_BUMP:
                 continue
             rows.append((e.scan, e.scan, e.text, e.bump))
             continue
-        at = latest.get(e.text)
-        if at is not None and rows[at][1] == e.scan - 1:
-            rows[at] = (rows[at][0], e.scan, e.text, 0.0)
-        else:
-            latest[e.text] = len(rows)
-            rows.append((e.scan, e.scan, e.text, 0.0))
+        rows.append((e.scan, e.scan + e.scans - 1, e.text, 0.0))
     rows += [(s.first, s.last, f"at the {s.limit} limit", 0.0) for s in playback.saturations]
     return sorted(rows, key=lambda row: row[0])
 

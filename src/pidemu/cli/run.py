@@ -196,6 +196,8 @@ def _notes(
         if outside:
             yield f"in {outside} samples the manual output is outside the output limits; it is taken as it is"
     a = controller.settings.algorithm()
+    for what in a.too_coarse(controller.interval):
+        yield f"a scan interval of {number(controller.interval)} s is long for these settings: {what}"
     if not (a.ki or a.velocity or a.start == "load-output" or bias):
         yield "there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"
 
@@ -209,11 +211,13 @@ def _initial(record: Record) -> float:
 
 def _worst(recorded: Floats, emulated: Floats) -> tuple[float, int, float] | None:
     """Return the largest difference, where it is, and the root mean square; ``None`` where nothing is recorded."""
-    difference = np.abs(emulated - recorded)
-    if np.all(np.isnan(difference)):
+    known = np.isfinite(recorded)
+    if not known.any():
         return None
-    at = int(np.nanargmax(difference))
-    return float(difference[at]), at, float(np.sqrt(np.nanmean(difference**2)))
+    difference = np.where(known, np.abs(emulated - recorded), 0.0)
+    difference[known & ~np.isfinite(emulated)] = np.inf  # no number where one was recorded
+    at = int(np.argmax(difference))
+    return float(difference[at]), at, float(np.sqrt(np.mean(difference[known] ** 2)))
 
 
 def _difference(record: Record, emulated: Floats) -> str:

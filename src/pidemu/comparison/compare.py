@@ -154,6 +154,8 @@ def compare(
     >>> found.segments[1].name, round(found.differences[0].by_segment[1], 9)  # K times a step of 2 %
     ('setpoint steps', 4.0)
     """
+    if isinstance(settings, Settings):
+        raise ScanError("compare takes a list of settings: pidemu.compare([first, second])")
     if len(settings) < 2:
         raise ScanError(f"a comparison needs two controllers or more, {len(settings)} given")
     path = "record" if record is None or isinstance(record, Record) else record

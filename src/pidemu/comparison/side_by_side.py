@@ -153,7 +153,12 @@ def run_on(
     if action == "direct" and settings.equation.action.fixed:
         notes.append(f"{label}: there is no choice of action: the sign of the gain decides")
     notes += [f"{label}: {note}" for note in settings.notes]
-    played = play(controller, scale.own(seen), path, timing.interval)
+    own = scale.own(seen)
+    if np.isfinite([own.sp[0], own.pv[0]]).all() and (own.auto is None or own.auto[0] > 0):
+        controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(initial_output))
+    if not np.isfinite(settings.equation.output.limits).all():
+        notes.append(f"{label}: the card has no output limits of its own; it has {limits[0]:g} to {limits[1]:g} % here")
+    played = play(controller, own, path, timing.interval)
     outputs = scale.output_percent(played.outputs)
     per_unit = float(np.diff(scale.output_percent(np.array([0.0, 1.0])))[0])
     events = tuple(replace(e, bump=e.bump * per_unit) for e in played.events)

@@ -26,6 +26,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     """
     if c.refusal:
         yield f"these are only the nearest settings: {c.refusal}"
+    yield from _beyond_the_law(c.source, c.settings)
     yield from _ranges(c)
     if c.better is not None:
         yield f"other options of the target would do better: {c.better}"
@@ -34,7 +35,6 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     yield from _noise(c)
     yield from _without_integral(c.source, c.settings)
     yield from _nonlinear(c.source, c.settings)
-    yield from _beyond_the_law(c.source, c.settings)
     yield from _action(c.source, c.settings)
     yield from _scan(c)
 
@@ -119,6 +119,17 @@ def _without_integral(source: Settings, target: Settings) -> Iterator[str]:
         )
 
 
+_STARTS: Final = {
+    "bumpless": "does not bump",
+    "load-output": "loads the output into the integral and bumps by its other terms",
+    "tracked": "lets the integral track the output in manual and goes on from there",
+    "keep": "keeps the integral as it stood",
+    "zero": "starts with an integral of zero",
+    "running": "computes on in manual, so that the output jumps to what it has computed",
+}
+"""What a transfer does, by `transfer.start`."""
+
+
 def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
     old, new = source.equation, target.equation
     has_integral = bool(source.algorithm().ki) and bool(target.algorithm().ki)
@@ -127,13 +138,9 @@ def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
             f"at an output limit the integral behaves differently: {source.card.id} {old.integral.windup.scheme}, "
             f"{target.card.id} {new.integral.windup.scheme}"
         )
-    a = source.algorithm()
-    if old.transfer.start != new.transfer.start and (a.kp or a.kd):
-        bumps = target if new.transfer.start == "load-output" else source
-        yield (
-            f"transfer to automatic: {bumps.card.id} loads the output into the integral and bumps by its other terms, "
-            "the other controller does not"
-        )
+    if old.transfer.start != new.transfer.start:
+        words = " and ".join(f"{s.card.id} {_STARTS[s.equation.transfer.start]}" for s in (source, target))
+        yield f"transfers to automatic differ: {words}"
     if old.output.limits != new.output.limits and old.signals == new.signals:
         low, high = ("{:g} to {:g}".format(*e.output.limits) for e in (old, new))
         yield f"default output limits differ: {low} on the source, {high} on the target"
@@ -145,7 +152,7 @@ def _beyond_the_law(source: Settings, target: Settings) -> Iterator[str]:
     for who, mine, other in ((source, old, new), (target, new, old)):
         extra = [what for what in mine if what not in other]
         if extra:
-            yield f"only {who.card.id} has, beyond the linear law: {', '.join(extra)}"
+            yield f"the verdict is about the linear law alone, and {who.card.id} has what is not in it: {', '.join(extra)}"
 
 
 def _action(source: Settings, target: Settings) -> Iterator[str]:

@@ -177,13 +177,7 @@ def times_of(record: Record, scan: float, interval: Floats | None = None) -> Flo
 
 def unsupported(settings: Settings, record: Record) -> dict[str, str]:
     """Return why a card has no use for signals of a record, by signal."""
-    a = settings.algorithm()
-    reasons = {}
-    if "external_reset" in record.signals and a.windup != "external-reset":
-        reasons["external_reset"] = f"{settings.card.id} takes no external reset: its windup scheme is '{a.windup}'"
-    if "feedforward" in record.signals and a.feedforward is None:
-        reasons["feedforward"] = f"{settings.card.id} states no feedforward input"
-    return reasons
+    return settings.without_use_for(record.signals)
 
 
 def play(controller: Controller, record: Record, path: str | Path, interval: Floats | None = None) -> Playback:

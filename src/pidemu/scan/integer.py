@@ -72,7 +72,7 @@ def _ticks(seconds: float, what: str) -> int:
 
 def _whole(value: float, what: str) -> float:
     if abs(value - round(value)) > 1e-6:
-        raise ScanError(f"the {what} is no whole number of counts; give it in the steps of the card's dial")
+        raise ScanError(f"the {what} is no whole number of counts, {value:g}; give it in the steps of the card's dial")
     if abs(value) >= _LARGEST:
         raise ScanError(f"the {what} is too large for whole numbers")
     return float(round(value))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.models import Rule
@@ -58,7 +58,7 @@ def positional(b: Builder, a: Algorithm, h: float, t: Terms, bias: float) -> Non
     if a.accumulated and a.kp and a.b == 0:
         P, moved = _accumulated(b, a, t)
     scheme = _scheme(b, a)
-    holds_sum = bool(a.ki) or (a.start == "load-output" and a.keeps_load) or moved is not None or a.limits_without_integral
+    holds_sum = bool(a.ki) or (a.start == "load-output" and a.keeps_integral) or moved is not None or a.limits_without_integral
     I: Expr | None = None  # noqa: E741 (the field's symbol)
     grown: Expr | None = None
     if holds_sum:
@@ -140,9 +140,7 @@ def _gated(
     grown = b.let("dI", grown, "increment of the integral")
     pushes = scheme.output(grown)
     if a.gate.fast_return != 1:
-        factor = b.coefficient("fast", a.gate.fast_return, "factor on the way back from a limit", "-")
-        returns = ((last >= t.high) & (pushes < 0.0)) | ((last <= t.low) & (pushes > 0.0))
-        b.let("dI", select(returns, factor * grown, grown), "fast return from a limit (section 5)")
+        _hastened(b, a, t, scheme, P, state, grown, pushes, feed)
     if a.windup == "freeze" and not a.gate.this_scan:
         return _frozen(b, a, t, state, grown, pushes, last)
     if a.windup == "conditional":
@@ -155,6 +153,24 @@ def _gated(
             stop = blocks.saturated(v0, t.low, t.high, pushes)
         return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")
     return grown
+
+
+def _hastened(
+    b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr, pushes: Expr, feed: Expr | None
+) -> None:
+    """While the sum is beyond a limit and the integral on its way back, hasten it, but not past the limit (section 5)."""
+    now = scheme.output(blocks.summed([P, scheme.term(state), t.D]))
+    before = b.let("v_I", now if feed is None else now + feed, "sum before this scan's increment")
+    ahead = b.let("v_dI", before + pushes, "sum with it")
+    factor = b.coefficient("fast", a.gate.fast_return, "factor on the way back from a limit", "-")
+    high, low = (scheme.state(scheme.total(limit - before)) for limit in (t.high, t.low))
+    hastened = b.let("dI_fast", factor * grown, "increment of a shorter integral time")
+    flipped = scheme.gain is not None and a.kp < 0  # the state moves against the output
+    down = select(hastened > high, high, hastened) if flipped else select(hastened < high, high, hastened)
+    up = select(hastened < low, low, hastened) if flipped else select(hastened > low, low, hastened)
+    from_high, from_low = (ahead > t.high) & (pushes < 0.0), (ahead < t.low) & (pushes > 0.0)
+    b.let("fast_now", select(from_high | from_low, 1.0, 0.0), "on the way back from a limit")
+    b.let("dI", select(from_high, down, select(from_low, up, grown)), "fast return from a limit (section 5)")
 
 
 def _frozen(b: Builder, a: Algorithm, t: Terms, state: Name, grown: Expr, pushes: Expr, last: Name) -> Expr:
@@ -255,7 +271,11 @@ def _after_output(
         if a.windup == "external-reset" and b.has("reset"):
             outside = Name("reset")
             seen = b.let("seen", select(equal(outside, outside), outside, out), "external reset in place of the output (section 5)")
-        back = b.coefficient("back", _share(a, h), "share of the cut-off taken out of the integral per scan", "-")
+        back: Expr = b.coefficient("back", _share(a, h), "share of the cut-off taken out of the integral per scan", "-")
+        if a.gate.fast_return != 1:
+            hastened = replace(a, tracking_time=a.tracking_time / a.gate.fast_return)
+            fast = b.coefficient("back_fast", _share(hastened, h), "the same on the way back from a limit", "-")
+            back = select(Name("fast_now") > 0.0, fast, back)
         pulled = state + scheme.state(scheme.total(back * (seen - v)))
         if a.integral_deadband is not None:
             pulled = select(Name("i_still") > 0.0, state, pulled)
@@ -265,10 +285,6 @@ def _after_output(
     if a.windup == "freeze" and a.gate.this_scan:
         beyond = (v >= t.high) | (v <= t.low)
         b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
-    if a.windup == "reset-outside-band":
-        gain = scheme.gain if scheme.gain is not None else b.coefficient("kp_band", a.kp, "proportional gain", "%/%")
-        reach = blocks.magnitude(gain * t.signals.e)
-        b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if forward:
         assert grown is not None
         if a.first_scan_holds:
@@ -278,6 +294,10 @@ def _after_output(
         if a.integral_limits is not None:
             low, high = _limits(b, a, t)
             b.let("I", blocks.limited(state, low, high), "limits of the integral (section 5)")
+    if a.windup == "reset-outside-band":
+        gain = scheme.gain if scheme.gain is not None else b.coefficient("kp_band", a.kp, "proportional gain", "%/%")
+        reach = blocks.magnitude(gain * t.signals.e)
+        b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if a.windup in _FEEDS_BACK:
         b.let("I", blocks.flushed(state), "no denormal numbers (section 7)")
 

@@ -183,6 +183,8 @@ class Compiled:
         operator's output and output to follow.
     initial : tuple of float
         The states before the first scan, in the program's precision.
+    read_in_automatic : frozenset of str
+        Inputs that `run_automatic` reads.
     bind : callable
         From the coefficients' values to the three functions.
     """
@@ -191,6 +193,7 @@ class Compiled:
     run: Callable[..., list[float]]
     run_automatic: Callable[..., list[float]]
     initial: tuple[float, ...]
+    read_in_automatic: frozenset[str]
     bind: Callable[..., Any]
 
 
@@ -236,7 +239,8 @@ def compiled(program: Program, like: tuple[Program, Compiled] | None = None) -> 
     if program.precision == "float32":
         values, initial = _narrow(values), _narrow(initial)
     scan, run, run_automatic = bind(*values)
-    return Compiled(scan, run, run_automatic, initial, bind)
+    read = like[1].read_in_automatic if like is not None else frozenset(q.name for q in specialise(program).inputs)
+    return Compiled(scan, run, run_automatic, initial, read, bind)
 
 
 def _narrow(values: Sequence[float]) -> tuple[float, ...]:
