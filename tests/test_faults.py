@@ -145,7 +145,9 @@ def test_a_record_with_gaps_gives_the_same_in_a_run_and_scan_after_scan_and_the_
     once, often = (Controller(chosen, h, output_limits=(0, 100), initial_output=50.0) for _ in range(2))
     assert np.array_equal(x.run(once), np.array(x.step(often)), equal_nan=True)
     assert [repr(e) for e in once.events] == [repr(e) for e in often.events]
-    seen = (x.columns["hold"] == 0) & ~(np.isfinite(gaps["sp"]) & np.isfinite(gaps["pv"]))
+    columns = x.columns
+    in_cascade = (columns["auto"] > 0) & ~np.isnan(columns["cascade"]) & np.isnan(columns["track"])  # the local setpoint rests
+    seen = (columns["hold"] == 0) & ~((np.isfinite(gaps["sp"]) | in_cascade) & np.isfinite(gaps["pv"]))
     noted = [range(e.scan, e.scan + e.scans) for e in once.events if e.kind == "signal"]
     assert list(itertools.chain(*noted)) == np.flatnonzero(seen).tolist()
     faults = chosen.equation.faults
@@ -269,3 +271,27 @@ def test_a_filter_factor_is_the_share_per_scan_whatever_the_interval_of_the_scan
     ctl = Controller(card.settings(kp=1), output_limits=(-100, 100))
     out = ctl.run(0.0, [0, 16.0, 16.0, 16.0], interval=[1.0, 0.2, 3.0, 1.0])
     assert out.tolist() == pytest.approx([0, -4, -7, -9.25], rel=1e-12)  # h (1 - k)/k is rounded
+
+
+@pytest.mark.parametrize("value", BAD)
+def test_in_cascade_a_local_setpoint_that_is_no_number_is_not_missed(value: float) -> None:
+    once, often, undisturbed = bench(), bench(), bench()
+    u = once.run([52.0, value, 52.0], 51.0, cascade=55.0)
+    assert u.tolist() == [often.scan(sp, 51.0, cascade=55.0) for sp in (52.0, value, 52.0)]
+    assert u.tolist() == undisturbed.run(52.0, [51.0] * 3, cascade=55.0).tolist()
+    assert not [e for e in once.events if e.kind == "signal"]
+
+
+def test_in_manual_a_bad_signal_leaves_an_integral_that_tracks_with_the_operator() -> None:
+    ctl = bench(transfer={"start": "tracked"})
+    ctl.scan(50.0, 50.0, auto=False, manual=40.0)
+    assert ctl.scan(50.0, math.nan, auto=False, manual=80.0) == 80.0
+    assert ctl.scan(50.0, 50.0) == pytest.approx(80.0)
+
+
+def test_other_kinds_of_numbers_are_computed_with_as_floats() -> None:
+    ctl = bench()
+    ctl.scan(np.float32(51.1), np.float64(50.3))  # type: ignore[arg-type]
+    ctl.scan(51, 50, auto=False, manual=np.float32(33.3))  # type: ignore[arg-type]
+    assert {type(x) for x in ctl.state.values()} == {float}
+    assert {type(x) for x in ctl._state} == {float}

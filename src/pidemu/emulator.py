@@ -413,6 +413,8 @@ class Controller:
         """Do a scan with a hold, a bad signal or an uneven interval."""
         if hold:
             return self._stand("hold", inputs)
+        if mode == "cascade" and not isfinite(inputs[0]):  # the local setpoint is not used
+            inputs = (inputs[4 + self._names.index("cascade")], *inputs[1:])
         named = {"setpoint": inputs[0], "measurement": inputs[1]}
         if "cascade" in self._signals:
             remote = inputs[4 + self._names.index("cascade")]

@@ -232,7 +232,7 @@ CASES: tuple[Case, ...] = (
     (
         "reject_bad_transfer",
         (("transfer: {start: bumpless}", "transfer: {start: keep, loaded: as-it-is}"),),
-        ("12:1: 'loaded' and 'without-integral' belong to start 'load-output'",),
+        ("12:1: 'loaded' belongs to start 'load-output'",),
     ),
     (
         "reject_bad_transfer",
