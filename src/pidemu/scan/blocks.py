@@ -76,12 +76,21 @@ class Builder:
         """Whether there has been no scan yet."""
         return equal(self.state("begun", "there has been a scan", "-"), 0.0)
 
+    def _live(self) -> set[str]:
+        """Return every name that the output depends on, in this scan or by way of a state in a later one."""
+        live: set[str] = set()
+        found = {"u"}
+        while found - live:
+            live |= found
+            found = {name for assign in self._body if assign.name in live for name in names_in(assign.value)}
+        return live
+
     def program(self, a: Algorithm) -> Program:
-        """Return the finished program, without states that nothing reads."""
-        read = {name for assign in self._body for name in names_in(assign.value)} | {"u"}
-        self._states = {name: state for name, state in self._states.items() if name in read}
-        self._body = [assign for assign in self._body if assign.name in read]
-        self._coefficients = {name: pair for name, pair in self._coefficients.items() if name in read}
+        """Return the finished program, without what its output does not depend on."""
+        live = self._live()
+        self._states = {name: state for name, state in self._states.items() if name in live}
+        self._body = [assign for assign in self._body if assign.name in live]
+        self._coefficients = {name: pair for name, pair in self._coefficients.items() if name in live}
         return Program(
             title=self.title,
             inputs=(*INPUTS, *(q for name, q in EXTRA_INPUTS.items() if name in self.signals)),
