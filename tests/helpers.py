@@ -14,9 +14,10 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 from pidemu.algorithm import Algorithm
+from pidemu.card.base import Rule
 from pidemu.card.library import load_card
 from pidemu.card.load import Card, card_from
-from pidemu.card.models import Rule, Setting
+from pidemu.card.models import Setting
 from pidemu.card.references import is_active
 from pidemu.card.source import parse
 from pidemu.errors import SettingError

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.algorithm import Algorithm, Place
+from pidemu.card.base import GENERAL_RULES, Rule
 from pidemu.card.load import Card
-from pidemu.card.models import GENERAL_RULES, Rule
 from pidemu.errors import ScanError
 from pidemu.law import Law
 from pidemu.settings import Settings

@@ -18,8 +18,8 @@ from click.testing import CliRunner
 from pydantic import Field, ValidationError, model_validator
 
 import pidemu
+from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
-from pidemu.card.models import Model, Number, Text
 from pidemu.card.source import Document, parse, parse_file
 from pidemu.cli import cli
 from pidemu.conversion.loopfile import read_loop

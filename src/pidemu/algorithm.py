@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError
 
 Place = Literal["term", "measurement", "output"]

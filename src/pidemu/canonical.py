@@ -7,20 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
-from pidemu.card.models import (
-    Equation,
-    ErrorShape,
-    Filter,
-    Form,
-    IntegralLimits,
-    Measurement,
-    Rule,
-    Setpoint,
-    WindupBackCalculation,
-    WindupExternalReset,
-    WindupGate,
-    WindupRecompute,
-)  # fmt: skip
+from pidemu.card.base import Form, Rule
+from pidemu.card.integral import IntegralLimits, WindupBackCalculation, WindupExternalReset, WindupGate, WindupRecompute
+from pidemu.card.models import Equation
+from pidemu.card.terms import ErrorShape, Filter, Measurement, Setpoint
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
 from pidemu.units import Role, Spans, parse_quantity, parse_unit, to_canonical

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import isfinite
 
-from pidemu.card.models import Faults
+from pidemu.card.stages import Faults
 from pidemu.errors import ScanError
 
 _DONE = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.canonical import default_scan
-from pidemu.card.models import Faults
+from pidemu.card.stages import Faults
 from pidemu.doubtful import bad_signal, usable_interval
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.running import Running, resting

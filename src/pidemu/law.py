@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.algorithm import Algorithm, Dahlin, Lag, check_filters
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError, UndefinedError
 from pidemu.rational import Rational, Response, add, multiply
 

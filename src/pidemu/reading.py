@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Final
 
+from pidemu.card.base import Form
 from pidemu.card.load import Card, Variant, match_name
-from pidemu.card.models import Form, Setting
+from pidemu.card.models import Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.settings import RESERVED, Settings, Value, limits, off_values, spans_of

@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.card import models, schema
+from pidemu.card import base, integral, models, schema, stages, terms
 from pidemu.card.load import card_from
 from pidemu.card.source import parse
 from pidemu.errors import CardError
@@ -162,5 +162,6 @@ def test_every_part_of_the_language_is_in_the_reference() -> None:
     }
     linked = set(re.findall(r"\(#([a-z-]+)\)", schema.reference()))
     assert linked <= headings
-    parts = {name.lower() for name, c in vars(models).items() if isinstance(c, type) and issubclass(c, models.Model)}
+    rooms = (base, integral, models, stages, terms)
+    parts = {name.lower() for room in rooms for name, c in vars(room).items() if isinstance(c, type) and issubclass(c, base.Model)}
     assert parts - {"model"} == {heading.replace("-", "") for heading in headings - {"card"} | {"cardfile"}}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pidemu.algorithm import Algorithm, Lag
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.scan.program import Program
 from pidemu.targets.python import compiled
 from tests.helpers import Floats

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pidemu import Controller
 from pidemu.algorithm import Algorithm
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError
 from pidemu.scan.build import build
 from pidemu.targets.python import source

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pidemu.algorithm import Algorithm, Shape
-from pidemu.card.models import GENERAL_RULES, Rule
+from pidemu.card.base import GENERAL_RULES, Rule
 from pidemu.scan.build import build
 from tests.helpers import WIDE, Floats, outputs
 from tests.scan.support import signals, states_of

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.algorithm import Algorithm, Place, Scheme
+from pidemu.card.base import GENERAL_RULES, Rule
 from pidemu.card.load import variants
-from pidemu.card.models import GENERAL_RULES, Rule
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.errors import ScanError

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pidemu import Controller
 from pidemu.algorithm import Algorithm, Lag
-from pidemu.card.models import GENERAL_RULES, Rule
+from pidemu.card.base import GENERAL_RULES, Rule
 from pidemu.errors import ScanError
 from pidemu.law import Law
 from pidemu.scan.build import build

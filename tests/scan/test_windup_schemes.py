@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pidemu.algorithm import Algorithm, Gate, Scheme
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.scan.build import build
 from pidemu.scan.program import Program
 from pidemu.targets.python import compiled

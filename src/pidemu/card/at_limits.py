@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pidemu.card.legend import named, short
-from pidemu.card.models import (
-    Equation,
-    Form,
+from pidemu.card.base import Form
+from pidemu.card.integral import (
     IntegralLimits,
     WindupBackCalculation,
     WindupClamp,
@@ -17,6 +15,8 @@ from pidemu.card.models import (
     WindupResetOutsideBand,
     WindupVelocity,
 )
+from pidemu.card.legend import named, short
+from pidemu.card.models import Equation
 
 Row = tuple[str, str]
 """What it is about, and what happens."""

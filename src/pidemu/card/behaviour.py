@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from pidemu.card.at_limits import Row
+from pidemu.card.base import Form, Rule
+from pidemu.card.integral import Integral
 from pidemu.card.legend import filter_at_work, short
-from pidemu.card.models import Derivative, Equation, Faults, Form, Integral, Rule
+from pidemu.card.models import Equation
+from pidemu.card.stages import Faults
+from pidemu.card.terms import Derivative
 
 _HOLDS: Final = {
     "ki e": "",

@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from pidemu.card.base import Evidence, Status
 from pidemu.card.library import cards, load_card
 from pidemu.card.load import EMULATION, Card, variants
-from pidemu.card.models import Evidence, Status
 
 FILE: Final = Path(__file__).resolve().parents[3] / "docs" / "emulation.md"
 _HOW: Final = {

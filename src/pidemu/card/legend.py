@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from pidemu.card.models import Equation, ErrorShape, Filter, Form, SignalFilter
+from pidemu.card.base import Form
+from pidemu.card.models import Equation
+from pidemu.card.terms import ErrorShape, Filter, SignalFilter
 from pidemu.errors import UnitError
 from pidemu.units import Dimension, parse_unit
 

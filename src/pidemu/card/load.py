@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from pidemu.card.base import Evidence, Status
 from pidemu.card.faults import problems
-from pidemu.card.models import CardFile, Equation, Evidence, Setting, Status
+from pidemu.card.models import CardFile, Equation, Setting
 from pidemu.card.source import Document, Path_, parse_file
 from pidemu.errors import CardError, Problem, SettingError, suggest
 

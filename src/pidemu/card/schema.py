@@ -18,7 +18,7 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pidemu.card import models
+from pidemu.card import base, integral, models, stages, terms
 from pidemu.card.models import CardFile, Equation
 
 BEGIN: Final = "<!-- generated from src/pidemu/card/models.py: begin -->"
@@ -26,12 +26,12 @@ END: Final = "<!-- generated from src/pidemu/card/models.py: end -->"
 
 _WHOLE: Final = ("Filter", "SignalFilter", "Windup")
 _ORDER: Final = (
-    CardFile, models.Source, models.Equation, models.Setpoint, models.Measurement, models.SignalFilter, models.ErrorShape,
-    models.Proportional, models.Cascade, models.Integral, models.IntegralLimits, models.WindupNone, models.WindupClamp,
-    models.WindupGate, models.WindupRecompute, models.WindupBackCalculation, models.WindupExternalReset, models.WindupVelocity,
-    models.WindupResetOutsideBand, models.Derivative, models.Filter, models.Feedforward, models.Transfer, models.Setting,
-    models.Option, models.Action, models.ActionExample, models.Scan, models.Output, models.Arithmetic, models.Faults,
-    models.Evidence, models.Quirk, models.Example, models.Canonical,
+    CardFile, base.Source, models.Equation, terms.Setpoint, terms.Measurement, terms.SignalFilter, terms.ErrorShape,
+    terms.Proportional, terms.Cascade, integral.Integral, integral.IntegralLimits, integral.WindupNone, integral.WindupClamp,
+    integral.WindupGate, integral.WindupRecompute, integral.WindupBackCalculation, integral.WindupExternalReset,
+    integral.WindupVelocity, integral.WindupResetOutsideBand, terms.Derivative, terms.Filter, terms.Feedforward,
+    stages.Transfer, models.Setting, models.Option, stages.Action, stages.ActionExample, stages.Scan, stages.Output,
+    stages.Arithmetic, stages.Faults, base.Evidence, models.Quirk, models.Example, models.Canonical,
 )  # fmt: skip
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pidemu.card.base import Form
 from pidemu.card.legend import Signals, filter_at_work, legend
 from pidemu.card.load import Variant
-from pidemu.card.models import Equation, Form, Proportional
+from pidemu.card.models import Equation
+from pidemu.card.terms import Proportional
 
 
 def equation_heading(variant: Variant) -> str:

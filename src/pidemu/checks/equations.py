@@ -9,10 +9,12 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from pidemu.card.base import Rule
 from pidemu.card.load import Variant, dotted, variants
-from pidemu.card.models import Derivative, Equation, Proportional, Rule
+from pidemu.card.models import Equation
 from pidemu.card.references import BY_ROLE, references
 from pidemu.card.source import Path_
+from pidemu.card.terms import Derivative, Proportional
 from pidemu.checks import stages
 from pidemu.errors import PidemuError, Problem, suggest
 from pidemu.settings import limits, off_values

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from pidemu.card.base import GENERAL_RULES, Rule
+from pidemu.card.integral import WindupBackCalculation, WindupGate
 from pidemu.card.load import Variant
-from pidemu.card.models import GENERAL_RULES, Equation, ErrorShape, Rule, WindupBackCalculation, WindupGate
+from pidemu.card.models import Equation
+from pidemu.card.terms import ErrorShape
 from pidemu.errors import Problem
 from pidemu.settings import limits
 from pidemu.units import Dimension, parse_unit

@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from pidemu.card.base import Status
 from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
-from pidemu.card.models import Status
 from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
 from pidemu.settings import RESERVED

@@ -6,9 +6,9 @@ from collections import Counter
 
 import click
 
+from pidemu.card.base import Status
 from pidemu.card.library import card_files
 from pidemu.card.load import Card, load_file
-from pidemu.card.models import Status
 from pidemu.cli.common import json_option, print_json, table, vendors_option
 from pidemu.errors import CardError
 

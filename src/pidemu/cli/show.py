@@ -11,10 +11,11 @@ from typing import Final
 import click
 
 from pidemu.card.at_limits import limit_rows
+from pidemu.card.base import Evidence
 from pidemu.card.behaviour import mode_rows, scan_rows
 from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
-from pidemu.card.models import Evidence, Example, Setting
+from pidemu.card.models import Example, Setting
 from pidemu.card.references import is_active
 from pidemu.card.text import equation_heading, equation_lines
 from pidemu.cli.common import assignments, heading, json_option, number, print_json, vendors_option, wrapped

@@ -8,9 +8,9 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
+from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.card.models import Form
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.alternatives import better_options
 from pidemu.conversion.certificate import Certificate, Rounded, Verdict

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
+from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
-from pidemu.card.models import Model, Number, Text
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
 

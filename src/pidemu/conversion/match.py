@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.models import Form
+from pidemu.card.base import Form
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import UndefinedError
 from pidemu.law import Law

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.card.models import Form
+from pidemu.card.base import Form
 from pidemu.conversion.certificate import bands
 from pidemu.conversion.target import Numbers, Target
 from pidemu.law import Law, at_frequencies, paths

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Literal
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.models import Form
+from pidemu.card.base import Form
 from pidemu.conversion import match as closed
 from pidemu.conversion.certificate import Certificate, certify
 from pidemu.conversion.match import NoMatchError

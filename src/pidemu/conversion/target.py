@@ -10,8 +10,9 @@ from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import gain_sign
+from pidemu.card.base import Form
 from pidemu.card.load import Card, Variant
-from pidemu.card.models import Equation, Form, Setting
+from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
 from pidemu.settings import Settings, limits, off_values, spans_of

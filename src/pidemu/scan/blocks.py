@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from pidemu.algorithm import Algorithm, Lag, Shape
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.scan.program import Assign, Binary, Expr, Floor, Name, Operand, Program, Quantity, equal, expr, names_in, select
 
 TINY: Final = 1e-300

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pidemu.algorithm import Algorithm, check_filters
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError
 from pidemu.scan.blocks import EXTRA_INPUTS, Builder
 from pidemu.scan.dahlin import dahlin

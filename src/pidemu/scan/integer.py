@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Final
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError
 from pidemu.scan import blocks, output
 from pidemu.scan.blocks import Builder

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.scan import blocks, output
 from pidemu.scan.blocks import Builder
 from pidemu.scan.program import Expr, Name, equal, expr, select

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pidemu.algorithm import Algorithm, Shape
-from pidemu.card.models import Rule
+from pidemu.card.base import Rule
 from pidemu.errors import ScanError
 from pidemu.scan import blocks, output
 from pidemu.scan.blocks import Builder
