@@ -18,7 +18,7 @@ from pidemu.running import Running, resting
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
-from pidemu.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, spells
+from pidemu.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, stretches
 
 if TYPE_CHECKING:
     from pidemu.targets.python import Compiled
@@ -260,7 +260,7 @@ class Controller:
         except PidemuError:
             self._kept = constant
             raise
-        last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
+        last = self._last_inputs()
         weights = (old.algorithm().c, new.algorithm().c)
         other_signal = weights[0] != weights[1]  # what the derivative remembers is another signal's
         kept = {n: x for n, x in before.named().items() if not (other_signal and n in ("x1", "x2", "x3"))}
@@ -275,10 +275,14 @@ class Controller:
         self._use(new, after)
         return new
 
+    def _last_inputs(self) -> dict[str, float]:
+        """Return the inputs of the last scan by name; none before the first."""
+        return dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
+
     def _constant_left_by(self, new: Settings) -> float:
         """Return what the integral leaves behind where new settings switch it off and the card keeps it."""
         old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
-        if a.ki or a.velocity or not a.keeps_integral or (a.start == "load-output" and a.keeps_integral):
+        if a.ki or a.velocity or not a.keeps_integral or a.start == "load-output":
             return 0.0
         if not old.ki or "I" not in self._running:
             return self._kept
@@ -395,7 +399,7 @@ class Controller:
         wanted = tuple(program for argument, program in SIGNALS.items() if argument in extra or program in self._signals)
         if wanted != self._signals:
             self._signals, state = wanted, self.state
-            last = dict(zip((q.name for q in self.program.inputs), self._last, strict=True)) if self._last else {}
+            last = self._last_inputs()
             running = self._running_with(self.settings)
             running.take_over(state, last)
             self._use(self.settings, running)
@@ -495,7 +499,8 @@ class Controller:
         hold : array_like of bool, shape (n,) or scalar, optional
             As in `scan`.
         interval : array_like, shape (n,) or scalar, optional
-            Time since the last scan [s], as in `scan`; NaN: the nominal one.
+            Time since the last scan [s], as in `scan`; NaN: none could be measured, so where the card measures it nothing is
+            computed and the output is held.
 
         Returns
         -------
@@ -539,7 +544,7 @@ class Controller:
         if measured:
             odd |= signals["interval"] != self.interval
         inputs = [signals[name] for name in ("sp", "pv", "auto", "manual", *self._names)]
-        for start, end in spells(modes, odd):
+        for start, end in stretches(modes, odd):
             mode = MODES[modes[start]]
             if odd[start]:
                 for i in range(start, end):

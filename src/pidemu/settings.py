@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.load import Card, Statement, Variant
@@ -224,6 +224,14 @@ class Settings(Mapping[str, Value]):
         from pidemu.canonical import algorithm_of  # numbers are made from settings, not settings from numbers
 
         return algorithm_of(self, own_units=own_units, scan=scan)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return card, active settings and options as plain values, for JSON."""
+        return {
+            "card": self.card.id,
+            "settings": {n: {"value": v.value, "unit": v.unit} for n, v in self.items() if v.active},
+            "options": dict(self.options),
+        }
 
     def without_use_for(self, signals: Iterable[str]) -> dict[str, str]:
         """Return why the card has no use for signals, by signal: ``"external_reset"`` and ``"feedforward"`` need a place to go."""

@@ -79,7 +79,7 @@ def modes_of(signals: Mapping[str, Floats]) -> npt.NDArray[np.int_]:
     return np.where(signals["hold"] > 0, 4, modes)
 
 
-def spells(modes: npt.NDArray[np.int_], odd: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def stretches(modes: npt.NDArray[np.int_], odd: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """Yield start and end of every stretch in one mode that is odd, or not, throughout."""
     if modes.size:
         edges = np.flatnonzero((np.diff(modes) != 0) | (np.diff(odd.astype(int)) != 0)) + 1

@@ -10,7 +10,7 @@ import pytest
 import pidemu
 from pidemu.errors import RecordError, ScanError
 from pidemu.record.files import Floats, Record
-from pidemu.record.playback import Playback, Saturation, even_step, modes, play, spells, timing, unsupported
+from pidemu.record.playback import Playback, Saturation, even_step, modes, play, spells, timing
 from pidemu.signals import Event
 
 NAN = math.nan
@@ -134,11 +134,11 @@ def test_plain_values_hold_events_and_saturations() -> None:
 
 def test_signals_without_a_use_are_named_with_the_reason() -> None:
     record = still(1, feedforward=of(1), external_reset=of(2), cascade=of(3), track=of(4))
-    assert unsupported(PI, record) == {
+    assert PI.without_use_for(record.signals) == {
         "external_reset": "generic/standard takes no external reset: its windup scheme is 'back-calculation'",
         "feedforward": "generic/standard states no feedforward input",
     }
-    assert list(unsupported(pidemu.load_card("fisher/provox").settings(GAIN=1, RESET=1), record)) == ["feedforward"]
+    assert list(pidemu.load_card("fisher/provox").settings(GAIN=1, RESET=1).without_use_for(record.signals)) == ["feedforward"]
 
 
 # --- what a controller starts from ---------------------------------------------------------------------------------------

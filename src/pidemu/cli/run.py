@@ -13,7 +13,6 @@ import numpy as np
 from pidemu.card.library import load_card
 from pidemu.cli.common import action_option, assignments, json_option, limits_option, number, print_json, vendors_option
 from pidemu.cli.happened import tell
-from pidemu.comparison.side_by_side import plain_settings
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.plain import json_safe
@@ -152,7 +151,7 @@ def _plain(controller: Controller, record: Record, playback: Playback) -> dict[s
         pair = {"emulated": float(playback.outputs[at]), "recorded": float(record.output[at])}
         difference = {"largest": largest, "scan": at, **pair, "rms": rms}
     plain = {
-        **plain_settings(controller.settings),
+        **controller.settings.to_dict(),
         "scan": controller.interval,
         "outputs": playback.outputs.tolist(),
         **playback.to_dict(),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pidemu.canonical import default_scan
-from pidemu.comparison.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, plain_settings, run_on
+from pidemu.comparison.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, run_on
 from pidemu.errors import ScanError
 from pidemu.plain import json_safe
 from pidemu.record.files import Floats, Record, read_record
@@ -76,7 +76,7 @@ class Comparison:
             "controllers": [
                 {
                     "label": run.label,
-                    **plain_settings(run.settings),
+                    **run.settings.to_dict(),
                     "scan": run.scan,
                     "limits": list(run.limits),
                     "outputs": run.output_at(self.times).tolist(),

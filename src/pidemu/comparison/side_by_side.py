@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pidemu.record.files import Floats, Record
-from pidemu.record.playback import Playback, play, unsupported
+from pidemu.record.playback import Playback, play
 from pidemu.record.sampling import Scale, controller_for, sampled
 from pidemu.record.standard import Segment
 from pidemu.scan.build import Action
@@ -88,15 +88,6 @@ def dials(s: Settings) -> str:
     return ", ".join([*shown, *(f"{n}={c}" for n, c in s.options.items())])
 
 
-def plain_settings(s: Settings) -> dict[str, Any]:
-    """Return card, settings and options as plain values."""
-    return {
-        "card": s.card.id,
-        "settings": {n: {"value": v.value, "unit": v.unit} for n, v in s.items() if v.active},
-        "options": dict(s.options),
-    }
-
-
 def labels(settings: Sequence[Settings]) -> list[str]:
     """Return the id of every card, with a number from the second time on."""
     seen: Counter[str] = Counter()
@@ -143,7 +134,7 @@ def run_on(
     """
     scale = Scale(settings)
     seen, timing = sampled(record, path, scan[0], settings, scan[1])
-    for signal, reason in unsupported(settings, seen).items():
+    for signal, reason in settings.without_use_for(seen.signals).items():
         notes.append(f"{label}: column {seen.names.get(signal, signal)} is left out: {reason}")
         gone: dict[str, Any] = {signal: None}
         seen = replace(seen, **gone)

@@ -109,13 +109,13 @@ class Conversion:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json``."""
         plain = {
-            "from": _plain(self.source),
-            "to": _plain(self.settings),
+            "from": self.source.to_dict(),
+            "to": self.settings.to_dict(),
             "match": self.match,
             "verdict": self.verdict,
             "certificate": self.certificate.to_dict(),
             "textbook": {
-                "to": _plain(self.textbook.settings) if self.textbook.settings else None,
+                "to": self.textbook.settings.to_dict() if self.textbook.settings else None,
                 "certificate": self.textbook.certificate.to_dict() if self.textbook.certificate else None,
                 "reason": self.textbook.reason,
             },
@@ -128,14 +128,6 @@ class Conversion:
         }
         safe: dict[str, Any] = json_safe(plain)
         return safe
-
-
-def _plain(s: Settings) -> dict[str, Any]:
-    return {
-        "card": s.card.id,
-        "settings": {n: {"value": v.value, "unit": v.unit} for n, v in s.items() if v.active},
-        "options": dict(s.options),
-    }
 
 
 def convert(

@@ -175,11 +175,6 @@ def times_of(record: Record, scan: float, interval: Floats | None = None) -> Flo
     return times
 
 
-def unsupported(settings: Settings, record: Record) -> dict[str, str]:
-    """Return why a card has no use for signals of a record, by signal."""
-    return settings.without_use_for(record.signals)
-
-
 def play(controller: Controller, record: Record, path: str | Path, interval: Floats | None = None) -> Playback:
     """Run a controller on a record, one scan per sample.
 
@@ -199,7 +194,7 @@ def play(controller: Controller, record: Record, path: str | Path, interval: Flo
     RecordError
         The controller has no use for a signal of the record, or refuses a value.
     """
-    for signal, reason in unsupported(controller.settings, record).items():
+    for signal, reason in controller.settings.without_use_for(record.signals).items():
         raise RecordError(f"{path}: column {record.names.get(signal, signal)}: {reason}; leave the column out")
     try:
         outputs = controller.run(record.sp, record.pv, record.auto, record.by_hand, **record.signals, interval=interval)

@@ -43,8 +43,4 @@ def dahlin(b: Builder, a: Algorithm, h: float, sign: float, t: Terms) -> None:
     v = b.let("v", last + du, "last output and increment")
     for n in reversed(range(delay)):
         b.let(past[n].id, past[n - 1] if n else last, "shift the history of outputs")
-    out = output.within_limits(b, a, h, t, v, last)
-    final = output.stepped(b, a, t, out)
-    if last is not t.u:
-        b.let(last.id, select(b.automatic, out, manual), "output as the algorithm knows it")
-    output.finish(b, final, manual)
+    output.of_sum(b, a, h, t, v, last, manual)

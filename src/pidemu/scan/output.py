@@ -88,6 +88,15 @@ def finish(b: Builder, out: Expr, manual: Expr) -> None:
     b.let("begun", 1.0, "there has been a scan")
 
 
+def of_sum(b: Builder, a: Algorithm, h: float, t: Terms, v: Expr, last: Name, manual: Expr) -> None:
+    """Take a sum whose increments count from the last output through limits and steps to the output, and keep it."""
+    out = within_limits(b, a, h, t, v, last)
+    final = stepped(b, a, t, out)
+    if last is not t.u:
+        b.let(last.id, select(b.automatic, out, manual), "output as the algorithm knows it")
+    finish(b, final, manual)
+
+
 def by_hand(b: Builder, a: Algorithm, u: Expr) -> Expr:
     """Return the output of this scan if it is not an automatic one (section 6)."""
     if a.manual_output == "zero":

@@ -36,11 +36,7 @@ def velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     if a.reads_back and b.has("reset"):
         base = b.let("base", select(equal(Name("reset"), Name("reset")), Name("reset"), last), "output read back (section 5)")
     v = b.let("v", base + du, "last output and increment")
-    out = output.within_limits(b, a, h, t, v, last)
-    final = output.stepped(b, a, t, out)
-    if last is not t.u:
-        b.let(last.id, select(b.automatic, out, manual), "output as the algorithm knows it")
-    output.finish(b, final, manual)
+    output.of_sum(b, a, h, t, v, last, manual)
 
 
 def _proportional(b: Builder, a: Algorithm, t: Terms) -> Expr:
