@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal
 
-import numpy as np
-import numpy.typing as npt
-
-from pidemu.law import Law, PathName
 from pidemu.plain import json_safe
-from pidemu.rational import Response
 
-Floats = npt.NDArray[np.float64]
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
 
 EXACT: Final = 1e-9
 """Largest relative deviation that counts as none: rounding, many times over."""
-
-_POINTS: Final = 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +101,133 @@ class Rounded:
 
 
 @dataclass(frozen=True, slots=True)
+class ScanByScan:
+    """Both controllers emulated on the same signals, in their linear range: no limit is reached (point 3 of the certificate).
+
+    Attributes
+    ----------
+    scan : tuple of float
+        Scan intervals of source and target [s].
+    taken : bool
+        Whether nobody gave these intervals, so that one was taken for both.
+    largest : float
+        Largest difference of the two outputs [% of the output span].
+    largest_at : float
+        When [s].
+    segment : str
+        In which part of the record.
+    on_measurement : float
+        Largest difference while the setpoint rests and only the measurement moves [% of the output span].
+    size : float
+        What the source's output moves over [% of the output span].
+    """
+
+    scan: tuple[float, float]
+    taken: bool
+    largest: float
+    largest_at: float
+    segment: str
+    on_measurement: float
+    size: float
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the outputs agree on all signals to 1e-9 of what they move over, of the span at least."""
+        return self.largest <= EXACT * max(100.0, self.size)
+
+    @property
+    def is_exact_on_measurement(self) -> bool:
+        """The same while the setpoint rests."""
+        return self.on_measurement <= EXACT * max(100.0, self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class NonlinearDifference:
+    """What two controllers do differently beyond the linear law (point 5 of the certificate).
+
+    Attributes
+    ----------
+    aspect : {"windup", "transfer", "limits", "arithmetic", "error", "output", "setpoint"}
+        What it is about.
+    text : str
+        The difference in one sentence, with its numbers.
+    figures : dict of str to tuple of float
+        The numbers by name, with the unit in brackets, of source and target; infinite where something never happens.
+    """
+
+    aspect: str
+    text: str
+    figures: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopFigures:
+    """A closed loop in figures (point 6 of the certificate).
+
+    Attributes
+    ----------
+    stable : bool
+        Whether the loop is stable.
+    gain_margin, phase_margin, delay_margin : float
+        Margins [factor, deg, s]; infinite where there is no such crossover.
+    crossover : float
+        Gain crossover frequency [rad/s]; NaN where there is none.
+    Ms, Mt : float
+        Largest sensitivity and complementary sensitivity.
+    iae : float
+        Integral of the absolute error after a load step of 1 % at the process input [% s]; infinite where the loop is unstable.
+    """
+
+    stable: bool
+    gain_margin: float
+    phase_margin: float
+    delay_margin: float
+    crossover: float
+    Ms: float
+    Mt: float
+    iae: float
+
+
+@dataclass(frozen=True, slots=True)
+class LoopComparison:
+    """The closed loop before and after.
+
+    Attributes
+    ----------
+    process : str
+        The process, as a transfer function.
+    source, target : LoopFigures
+        Figures of both.
+    """
+
+    process: str
+    source: LoopFigures
+    target: LoopFigures
+
+
+@dataclass(frozen=True, slots=True)
+class ScanCost:
+    """What a change of scan interval costs at the end of the loop band, before and after compensation.
+
+    Attributes
+    ----------
+    at : float
+        The end of the loop band [rad/s].
+    phase_deg : float
+        Phase that the target's hold has less than the source's, half the difference of the intervals [deg]; negative: it gains.
+    compensated : bool
+        Whether the settings make up for interval and rule.
+    uncompensated : float
+        Largest deviation of the held, sampled controllers in the loop band with the settings of the continuous law.
+    """
+
+    at: float
+    phase_deg: float
+    compensated: bool
+    uncompensated: float
+
+
+@dataclass(frozen=True, slots=True)
 class Certificate:
     """All figures of a conversion.
 
@@ -124,6 +243,16 @@ class Certificate:
         What the output moves by in the first scan, at the two scan intervals.
     time_scale : float
         The source's effective integral time, which places the loop band [s].
+    scan_by_scan : ScanByScan or None
+        Both controllers emulated; ``None`` where they cannot be, see `not_emulated`.
+    not_emulated : str
+        Why they could not be emulated.
+    scan_cost : ScanCost or None
+        What different scan intervals cost, where they were given.
+    nonlinear : tuple of NonlinearDifference
+        What differs beyond the linear law.
+    loop : LoopComparison or None
+        The closed loop before and after, where a process was given.
     dials : tuple of Rounded
         What rounding to the target's resolution did.
     feedback_before_rounding : PathComparison or None
@@ -137,6 +266,11 @@ class Certificate:
     setpoint_kick: Kick
     setpoint_kick_at_scan: Kick | None
     time_scale: float
+    scan_by_scan: ScanByScan | None = None
+    not_emulated: str = ""
+    scan_cost: ScanCost | None = None
+    nonlinear: tuple[NonlinearDifference, ...] = ()
+    loop: LoopComparison | None = None
     dials: tuple[Rounded, ...] = ()
     feedback_before_rounding: PathComparison | None = None
 
@@ -157,128 +291,3 @@ class Certificate:
             if kick is not None:
                 plain[name]["ratio"] = json_safe(kick.ratio)
         return plain
-
-
-def time_scale(law: Law) -> float:
-    """Return the effective integral time ``m1/m0`` that places the loop band [s] (section 9).
-
-    Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the
-    integral gain, and for proportional action alone, which has no time scale, one second.
-    """
-    m0, m1, m2 = law.moments()
-    if m0:
-        return abs(m1 / m0) if m1 / m0 > 0 else 1 / abs(m0)
-    return abs(m2 / m1) if m1 and m2 else 1.0
-
-
-def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return loop band and full band of a source [rad/s] (section 9).
-
-    Parameters
-    ----------
-    law : Law
-        The source's continuous law.
-    scan : float or None
-        The longer scan interval [s], whose Nyquist frequency ends both bands.
-    """
-    Ti = time_scale(law)
-    _, m1, m2 = law.moments()
-    Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
-    nyquist = math.pi / scan if scan is not None else math.inf
-    low = 0.01 / Ti
-    loop = max(min(5 / Ti, nyquist), low * 1.01)
-    return (low, loop), (low, max(min(100 / Td, nyquist), loop))
-
-
-def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
-    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = target / source
-        ratio[(source == 0) & (target == 0)] = 1.0
-        deviation = np.abs(ratio - 1)
-        gain = np.abs(20 * np.log10(np.abs(ratio)))
-        phase = np.abs(np.degrees(np.angle(ratio)))
-    return np.where(np.isnan(deviation), np.inf, deviation), np.where(np.isnan(gain), np.inf, gain), np.nan_to_num(phase)
-
-
-def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Response], low: float, high: float) -> Band:
-    """Compare two responses over a band.
-
-    The largest differences are looked for on a logarithmic grid, and once more, finely, around each of those found.
-
-    Parameters
-    ----------
-    source, target : callable
-        From frequencies [rad/s] to the complex response.
-    low, high : float
-        Ends of the band [rad/s].
-    """
-    w = np.geomspace(low, high, _POINTS)
-    found = differences(source(w), target(w))
-    peaks = {int(np.argmax(x)) for x in found}
-    fine = np.concatenate([np.geomspace(w[max(k - 1, 0)], w[min(k + 1, w.size - 1)], _POINTS // 4) for k in sorted(peaks)])
-    finer = differences(source(fine), target(fine))
-    deviation, gain, phase = (np.concatenate(pair) for pair in zip(found, finer, strict=True))
-    worst = int(np.argmax(deviation))
-    at = float(np.concatenate([w, fine])[worst])
-    return Band(low, high, float(deviation[worst]), float(np.max(gain)), float(np.max(phase)), at)
-
-
-def compare_paths(
-    source: Law, target: Law, path: PathName, limits: tuple[tuple[float, float], tuple[float, float]], factor: float
-) -> PathComparison:
-    """Compare one path of two laws over loop band and full band.
-
-    Parameters
-    ----------
-    source, target : Law
-        Both continuous, or each discrete at its own scan interval.
-    path : {"feedback", "setpoint"}
-        Which path.
-    limits : tuple
-        Loop band and full band [rad/s].
-    factor : float
-        What the source's gain is multiplied by for new signal ranges.
-    """
-
-    def scaled(w: Floats) -> Response:
-        return factor * source.response(w, path)
-
-    loop, full = (compare(scaled, lambda w: target.response(w, path), low, high) for low, high in limits)
-    worse = loop if loop.max_deviation > full.max_deviation else full  # the full band holds the loop band
-    gain, phase = max(loop.gain_db, full.gain_db), max(loop.phase_deg, full.phase_deg)
-    return PathComparison(loop, Band(full.low, full.high, worse.max_deviation, gain, phase, worse.worst_at))
-
-
-def certify(
-    source: Law,
-    target: Law,
-    at_scan: tuple[Law, Law] | None,
-    factor: float = 1.0,
-) -> Certificate:
-    """Return the certificate of two controllers.
-
-    Parameters
-    ----------
-    source, target : Law
-        The continuous laws.
-    at_scan : tuple of Law or None
-        The discrete laws of source and target at their scan intervals.
-    factor : float
-        What the source's gain is multiplied by for new signal ranges.
-    """
-    scans = [law.scan for law in at_scan or () if law.scan is not None]
-    limits = bands(source, max(scans) if scans else None)
-    discrete = [compare_paths(*at_scan, path, limits, factor) for path in _PATHS] if at_scan else [None, None]
-    return Certificate(
-        feedback=compare_paths(source, target, "feedback", limits, factor),
-        setpoint=compare_paths(source, target, "setpoint", limits, factor),
-        feedback_at_scan=discrete[0],
-        setpoint_at_scan=discrete[1],
-        setpoint_kick=Kick(factor * source.kick(), target.kick()),
-        setpoint_kick_at_scan=Kick(factor * at_scan[0].kick(), at_scan[1].kick()) if at_scan else None,
-        time_scale=time_scale(source),
-    )
-
-
-_PATHS: Final[tuple[PathName, PathName]] = ("feedback", "setpoint")

@@ -10,7 +10,8 @@ from typing import Literal
 from pidemu.algorithm import Algorithm
 from pidemu.card.base import Form
 from pidemu.conversion import match as closed
-from pidemu.conversion.certificate import Certificate, certify
+from pidemu.conversion.certificate import Certificate
+from pidemu.conversion.linear import certify
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.nearest import nearest
 from pidemu.conversion.target import Numbers, Target, TargetFilter
