@@ -57,7 +57,7 @@ gains = {"KP": st.floats(0.05, 20), "KI": st.floats(1e-3, 1), "KD": st.just(0.0)
 def test_independent_gains_of_the_pid_are_60_times_the_integral_and_a_sixtieth_of_the_derivative_on_the_pide(
     KP: float, KI: float, KD: float
 ) -> None:
-    conversion = pidemu.convert(pid(KP=KP, KI=KI, KD=KD, NDF="on"), PIDE, scan=1.0)
+    conversion = pidemu.convert(pid(KP=KP, KI=KI, KD=KD, NDF="on"), PIDE, options={"DSmoothing": "false"}, scan=1.0)
     assert values(conversion, "PGain", "IGain", "DGain") == pytest.approx([KP, 60 * KI, KD / 60], rel=1e-12)
     assert [conversion.settings[n].unit for n in ("IGain", "DGain")] == ["1/min", "min"]
     assert conversion.verdict == "exact"
@@ -136,13 +136,18 @@ def test_the_reset_of_the_pide_is_not_seconds_per_repeat() -> None:
 
 
 @pytest.mark.parametrize(("PE", "DependIndepend"), FORMS)
-def test_smoothing_on_one_side_only_is_not_called_exact_and_rests_on_an_assumption(PE: str, DependIndepend: str) -> None:
+def test_smoothing_is_exact_on_both_sides_only_and_then_rests_on_assumptions_of_both_cards(PE: str, DependIndepend: str) -> None:
     KI, KD = (0.05, 12) if PE == "independent" else (0.5, 0.1)
     source = pid(PE=PE, KP=2, KI=KI, KD=KD)
-    conversion = pidemu.convert(source, PIDE, options={"DependIndepend": DependIndepend}, scan=1.0)
-    assert conversion.verdict == "approximate"
-    assert not agree_scan_by_scan(conversion)
-    assert any("DSmoothing=true" in w for w in conversion.warnings)
+    rough, smooth = (
+        pidemu.convert(source, PIDE, options={"DependIndepend": DependIndepend, "DSmoothing": word}, scan=1.0)
+        for word in ("false", "true")
+    )
+    assert (rough.verdict, smooth.verdict) == ("approximate", "exact")
+    assert not agree_scan_by_scan(rough)
+    assert agree_scan_by_scan(smooth)
+    for card in (PID, PIDE):
+        assert any(a.startswith(f"{card}: derivative.filter") for a in smooth.law_assumptions)
 
 
 def test_a_time_per_repeat_is_no_unit_of_an_independent_integral_gain() -> None:
