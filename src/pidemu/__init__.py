@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import Conversion, convert
+    from pidemu.conversion.readings import Reading, readings
     from pidemu.emulator import Controller
     from pidemu.errors import (
         CardError,
@@ -38,6 +39,8 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.convert",
     "convert": "conversion.convert",
+    "Reading": "conversion.readings",
+    "readings": "conversion.readings",
     "Controller": "emulator",
     "CardError": "errors",
     "ConversionRefusedError": "errors",
@@ -63,6 +66,7 @@ __all__ = [
     "Event",
     "Law",
     "PidemuError",
+    "Reading",
     "Record",
     "RecordError",
     "ScanError",
@@ -75,6 +79,7 @@ __all__ = [
     "convert",
     "load_card",
     "read_record",
+    "readings",
 ]
 
 
