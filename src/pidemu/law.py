@@ -20,6 +20,7 @@ from pidemu.algorithm import Algorithm, Dahlin, Lag, check_filters
 from pidemu.card.base import Rule
 from pidemu.errors import ScanError, UndefinedError
 from pidemu.rational import Rational, Response, add, multiply
+from pidemu.series import hold, one_minus_delay
 
 PathName = Literal["feedback", "setpoint"]
 
@@ -142,9 +143,26 @@ def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
     Computed from ``1 - q`` itself, which stays accurate for frequencies far below the scan rate, where the expanded polynomials of
     `discrete_operators` cancel.
     """
-    rest: Response = -np.expm1(-1j * np.asarray(w, dtype=float) * h)  # 1 - q
+    angle = -1j * np.asarray(w, dtype=float) * h
+    return _by_rules(a, h, -np.expm1(angle), lambda d: _cancelled(d, h, angle))
 
-    def s_of(rule: Rule) -> Response:
+
+def _cancelled(d: Dahlin, h: float, angle: Any) -> Response:
+    g, p, q, delay = d.numbers(h)
+    rest, old = -np.expm1(angle), -np.expm1(angle * (delay + 1))  # 1 - z^-1, 1 - z^-(N+1)
+    value: Response = g * (1 - p * (1 - rest)) / (q * rest + (1 - q) * old)
+    return value
+
+
+def in_series(a: Algorithm, h: float) -> Operators:
+    """Return the discrete operators as power series in ``s``, for low frequencies."""
+    return _by_rules(a, h, one_minus_delay(h), _no_continuous_law)
+
+
+def _by_rules(a: Algorithm, h: float, rest: Any, pole_cancellation: Callable[[Dahlin], Any]) -> Operators:
+    """Return the operators of an algorithm's scan rules by ``rest = 1 - q``, be it values or a series."""
+
+    def s_of(rule: Rule) -> Any:
         match rule:
             case Rule.BACKWARD:
                 return rest / h
@@ -154,7 +172,7 @@ def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
                 return 2 * rest / (h * (2 - rest))
         raise ValueError(_DERIVATIVE_ONLY.format(rule.value))
 
-    def differentiator(Tf: float) -> Response:
+    def differentiator(Tf: float) -> Any:
         if a.derivative_rule is Rule.FOUR_POINT:
             q = 1 - rest
             return rest * (3 + 4 * q + 3 * q * q) / (10 * h)
@@ -165,14 +183,9 @@ def at_scan(a: Algorithm, h: float, w: npt.ArrayLike) -> Operators:
         s = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
         return s / (1 + Tf * s)
 
-    def lag(Tf: float, order: int) -> Response:
+    def lag(Tf: float, order: int) -> Any:
         s = s_of(a.filter_rule)
-        return 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s)
-
-    def pole_cancellation(d: Dahlin) -> Response:
-        g, p, q, delay = d.numbers(h)
-        old = -np.expm1(-1j * np.asarray(w, dtype=float) * h * (delay + 1))  # 1 - z^-(N+1)
-        return g * (1 - p * (1 - rest)) / (q * rest + (1 - q) * old)
+        return 1 / (1 + Tf * s + (Tf * s) * (Tf * s) / 2) if order == 2 else 1 / (1 + Tf * s)
 
     return Operators(
         integrator=1 / s_of(a.integral_rule),
@@ -314,6 +327,36 @@ class Law:
         values = at_frequencies(w) if self.scan is None else at_scan(self.algorithm, self.scan, w)
         found = paths(self.algorithm, values)[0 if path == "feedback" else 1]
         return np.broadcast_to(np.asarray(found, dtype=np.complex128), np.shape(w)).copy()
+
+    def held(self, w: npt.ArrayLike, path: PathName = "feedback") -> Response:
+        """Return the frequency response as a process sees it: of the discrete law, with the output held from scan to scan.
+
+        The hold is ``(1 - exp(-j w h))/(j w h)``, at low frequencies a delay of half a scan interval. The continuous law has none.
+
+        Parameters
+        ----------
+        w : array_like, shape (n,) or scalar
+            Angular frequencies [rad/s], as in `response`.
+        path : {"feedback", "setpoint"}
+            Which path.
+        """
+        found = self.response(w, path)
+        if self.scan is None:
+            return found
+        angle = 1j * np.asarray(w, dtype=float) * self.scan
+        value: Response = found * (-np.expm1(-angle) / angle)
+        return value
+
+    def held_expansion(self, terms: int, path: PathName = "feedback") -> tuple[float, ...]:
+        """Return the first `terms` coefficients of ``s C(s)``, at most 5, of what a process sees of the law (see `held`).
+
+        Of the continuous law they are those of `expansion`.
+        """
+        self.path(path)
+        if self.scan is None:
+            return self.expansion(terms, path)
+        found = paths(self.algorithm, in_series(self.algorithm, self.scan))[0 if path == "feedback" else 1]
+        return tuple((hold(self.scan) * found).terms[:terms])
 
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """Return ``n0, n1, n2, d1, d2`` of the continuous feedback path (specs/equations.md, section 2).

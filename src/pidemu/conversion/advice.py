@@ -26,15 +26,14 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     """
     if c.refusal:
         yield f"these are only the nearest settings: {c.refusal}"
-    yield from _beyond_the_law(c.source, c.settings)
     yield from _ranges(c)
-    if c.better is not None:
-        yield f"other options of the target would do better: {c.better}"
     yield from _setpoint(c)
     yield from _multiplier(c)
     yield from _noise(c)
     yield from _without_integral(c.source, c.settings)
-    yield from _nonlinear(c.source, c.settings)
+    yield from (difference.text for difference in c.certificate.nonlinear)
+    if c.certificate.not_emulated:
+        yield f"the two were not run against each other: {c.certificate.not_emulated}"
     yield from _action(c.source, c.settings)
     yield from _scan(c)
 
@@ -76,6 +75,17 @@ def _setpoint(c: Conversion) -> Iterator[str]:
     else:
         ratio = f" ({kick.ratio:.3g} times)" if 0 < kick.ratio < math.inf else ""
         yield f"setpoint steps: the output {_jumps(kick.target)}, on the source it {_jumps(kick.source)}{ratio}"
+    old, new = c.source.algorithm(), c.settings.algorithm()
+    if old.kp and new.kp and bool(old.b) != bool(new.b):
+        yield (
+            "proportional action is on the measurement in one and on the error in the other: no settings make their setpoint "
+            "responses equal; judge that of the loop by simulation, and tune for it"
+        )
+    filt = c.setpoint_filter
+    if c.certificate.headline.is_exact and filt is not None:
+        yield f"a setpoint filter {filt} before the target would give the source's setpoint response (times in s)"
+    elif c.certificate.headline.is_exact:
+        yield "no setpoint filter gives the source's setpoint response: it would have to differentiate"
 
 
 def _jumps(kick: float) -> str:
@@ -119,42 +129,6 @@ def _without_integral(source: Settings, target: Settings) -> Iterator[str]:
         )
 
 
-_STARTS: Final = {
-    "bumpless": "does not bump",
-    "load-output": "loads the output into the integral and bumps by its other terms",
-    "tracked": "lets the integral track the output in manual and goes on from there",
-    "keep": "keeps the integral as it stood",
-    "zero": "starts with an integral of zero",
-    "running": "computes on in manual, so that the output jumps to what it has computed",
-}
-"""What a transfer does, by `transfer.start`."""
-
-
-def _nonlinear(source: Settings, target: Settings) -> Iterator[str]:
-    old, new = source.equation, target.equation
-    has_integral = bool(source.algorithm().ki) and bool(target.algorithm().ki)
-    if has_integral and old.integral.windup.scheme != new.integral.windup.scheme:
-        yield (
-            f"at an output limit the integral behaves differently: {source.card.id} {old.integral.windup.scheme}, "
-            f"{target.card.id} {new.integral.windup.scheme}"
-        )
-    if old.transfer.start != new.transfer.start:
-        words = " and ".join(f"{s.card.id} {_STARTS[s.equation.transfer.start]}" for s in (source, target))
-        yield f"transfers to automatic differ: {words}"
-    if old.output.limits != new.output.limits and old.signals == new.signals:
-        low, high = ("{:g} to {:g}".format(*e.output.limits) for e in (old, new))
-        yield f"default output limits differ: {low} on the source, {high} on the target"
-
-
-def _beyond_the_law(source: Settings, target: Settings) -> Iterator[str]:
-    """Name what neither the law nor the certificate sees."""
-    old, new = source.algorithm().beyond_the_law, target.algorithm().beyond_the_law
-    for who, mine, other in ((source, old, new), (target, new, old)):
-        extra = [what for what in mine if what not in other]
-        if extra:
-            yield f"the verdict is about the linear law alone, and {who.card.id} has what is not in it: {', '.join(extra)}"
-
-
 def _action(source: Settings, target: Settings) -> Iterator[str]:
     old, new = source.equation.action.names, target.equation.action.names
     if {k: v.casefold() for k, v in old.items()} != {k: v.casefold() for k, v in new.items()}:
@@ -165,10 +139,20 @@ def _action(source: Settings, target: Settings) -> Iterator[str]:
 
 
 def _scan(c: Conversion) -> Iterator[str]:
-    if c.scan is not None and c.scan[0] != c.scan[1]:
-        cost = c.certificate.feedback_at_scan
-        if cost is not None:
-            yield (
-                f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: with them the loop-band deviation is "
-                f"{cost.loop_band.max_deviation:.2%}; do not scale the gain by their ratio, the settings are per second already"
-            )
+    cost = c.certificate.scan_cost
+    if c.scan is None or cost is None:
+        return
+    now = c.certificate.headline.loop_band.max_deviation
+    if c.scan[0] != c.scan[1]:
+        change = "costs" if cost.phase_deg > 0 else "gains"
+        yield (
+            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: that {change} {abs(cost.phase_deg):.2g} degrees of phase "
+            f"at {cost.at:.3g} rad/s, half the difference as dead time; with it the loop-band deviation is {now:.2%}; do not scale "
+            "the gain by their ratio: the settings are per second, not per scan, and a gain so scaled is wrong by that ratio"
+        )
+    if cost.compensated:
+        yield (
+            "the settings make up for scan intervals and rules: those of the continuous law would deviate by "
+            f"{cost.uncompensated:.2%}, these by {now:.2%}; they are right for these intervals only, and '--no-compensation' gives "
+            "the others"
+        )

@@ -275,13 +275,18 @@ class Certificate:
     feedback_before_rounding: PathComparison | None = None
 
     @property
+    def headline(self) -> PathComparison:
+        """The feedback path as it runs: at the scan intervals where these were given, else of the continuous law."""
+        return self.feedback_at_scan or self.feedback
+
+    @property
     def verdict(self) -> Verdict:
-        """``exact``, ``exact-feedback`` or ``approximate``."""
-        feedback = [c for c in (self.feedback, self.feedback_at_scan) if c is not None]
-        setpoint = [c for c in (self.setpoint, self.setpoint_at_scan) if c is not None]
-        if not all(c.is_exact for c in feedback):
+        """``exact``, ``exact-feedback`` or ``approximate``: laws at the scans, and emulations, count where there are any."""
+        emulated = self.scan_by_scan
+        if not self.headline.is_exact or not (emulated is None or emulated.is_exact_on_measurement):
             return "approximate"
-        return "exact" if all(c.is_exact for c in setpoint) else "exact-feedback"
+        same = (self.setpoint_at_scan or self.setpoint).is_exact and (emulated is None or emulated.is_exact)
+        return "exact" if same else "exact-feedback"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""

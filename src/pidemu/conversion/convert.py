@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion.advice import warnings_for
-from pidemu.conversion.alternatives import better_options
+from pidemu.conversion.aim import Match, read_aim
 from pidemu.conversion.certificate import Certificate, Rounded, Verdict
+from pidemu.conversion.choices import Attempt, attempts
+from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.solve import Match, Solver
+from pidemu.conversion.prefilter import SetpointFilter, setpoint_filter
+from pidemu.conversion.sentence import sentence
+from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.plain import json_safe
 from pidemu.settings import Settings, Value, limits
 from pidemu.units import Role, is_reciprocal, parse_unit
 
-MATCHES: Final = ("exact", "low-frequency", "textbook")
-"""Matches a user may ask for; by default exact where possible, else low-frequency."""
+if TYPE_CHECKING:
+    from pidemu.conversion.cutover import TransferPlan
+    from pidemu.process import Process
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class Conversion:
     source, settings : Settings
         The source's and the target's settings.
     match : str
-        How they were found: exact, low-frequency, textbook or constrained.
+        How they were found: exact, low-frequency, textbook, frequency, loop or constrained.
     certificate : Certificate
         How near they are.
     textbook : Textbook
@@ -63,12 +68,16 @@ class Conversion:
         What the target does differently, in words.
     refusal : str
         Why the target refused, where these are only the nearest settings.
-    better : str or None
-        Which other options of the target would give a better verdict.
+    chosen : dict of str to str
+        Options of the target that were chosen here, because nobody gave them, and are not as the card delivers them.
+    ranking : tuple of Attempt
+        The choices of the options that were looked at, the best first.
     factor : float
         What the source's gain was multiplied by for new signal ranges; negative where the action changes.
     scan : tuple of float or None
         Scan intervals of source and target [s].
+    process : Process or None
+        The process, where it was given.
     """
 
     source: Settings
@@ -78,14 +87,38 @@ class Conversion:
     textbook: Textbook
     warnings: tuple[str, ...]
     refusal: str = ""
-    better: str | None = None
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    ranking: tuple[Attempt, ...] = ()
     factor: float = 1.0
     scan: tuple[float, float] | None = None
+    process: Process | None = None
 
     @property
     def verdict(self) -> Verdict:
         """``exact``, ``exact-feedback`` or ``approximate``."""
         return self.certificate.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence for whoever stands at the loop."""
+        return sentence(self.certificate)
+
+    @property
+    def setpoint_filter(self) -> SetpointFilter | None:
+        """The setpoint filter that would make the setpoint paths agree; ``None`` where they do, or where no filter can."""
+        return setpoint_filter(self.source.law(), self.settings.law(), self.factor)
+
+    def transfer_plan(self, sp: float, pv: float, op: float) -> TransferPlan:
+        """Return what to set, and in which order, so that the cut-over to the target does not bump.
+
+        Parameters
+        ----------
+        sp, pv, op : float
+            Setpoint, measurement and output at the cut-over [engineering units where the ranges are given, else %].
+        """
+        from pidemu.conversion.cutover import transfer_plan
+
+        return transfer_plan(self.settings, sp, pv, op, scan=self.scan[1] if self.scan else None)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -113,6 +146,8 @@ class Conversion:
             "to": self.settings.to_dict(),
             "match": self.match,
             "verdict": self.verdict,
+            "sentence": self.sentence,
+            "chosen": dict(self.chosen),
             "certificate": self.certificate.to_dict(),
             "textbook": {
                 "to": self.textbook.settings.to_dict() if self.textbook.settings else None,
@@ -121,6 +156,8 @@ class Conversion:
             },
             "scan": list(self.scan) if self.scan else None,
             "gain_factor": self.factor,
+            "process": str(self.process) if self.process else None,
+            "setpoint_filter": self.setpoint_filter.to_dict() if self.setpoint_filter else None,
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
@@ -142,6 +179,10 @@ def convert(
     pv_range: tuple[float, float] | None = None,
     op_range: tuple[float, float] | None = None,
     round_dials: bool = False,
+    process: Process | None = None,
+    compensate: bool = True,
+    all_options: bool = False,
+    emulate: bool = True,
 ) -> Conversion:
     """Convert settings to another card.
 
@@ -152,13 +193,16 @@ def convert(
     target : str, path or Card
         The card to convert to, its id, or its file.
     options : mapping, optional
-        Options of the target; those not named take the card's defaults.
+        Options of the target. Those not named are chosen so that the verdict is best, the card's defaults where these are as good.
     given : mapping, optional
         Dials of the target that shall have these values, such as a filter factor or a setpoint weight.
     scan : float or tuple of float, optional
-        Scan interval of both, or of source and target [s]: adds the discrete laws to the certificate and to the verdict.
-    match : {"exact", "low-frequency", "textbook"}, optional
-        How to match; by default exact where the target's filter can be set so, else low-frequency.
+        Scan interval of both, or of source and target [s]: the settings make up for intervals and rules that differ, and
+        certificate and verdict are about the laws at these scans.
+    match : str, optional
+        How to match: ``"exact"``, ``"low-frequency"``, ``"textbook"``, ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover
+        with the process), ``"loop"`` (with a process: the load response changes least), ``"constrained"`` (the largest deviation in
+        the loop band is least); by default exact where possible, else low-frequency.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     pv_range, op_range : tuple of float, optional
@@ -166,6 +210,14 @@ def convert(
         the same effect in engineering units.
     round_dials : bool
         Round the dials to the target's resolution; the certificate states the effect.
+    process : Process, optional
+        The process, for the figures of the closed loop before and after, and to place the loop band.
+    compensate : bool
+        Whether the settings make up for scan intervals and rules that differ; otherwise they are those of the continuous law.
+    all_options : bool
+        Try every choice of the options, also where the card's defaults are exact: see `Conversion.ranking`.
+    emulate : bool
+        Whether the certificate emulates both controllers; without it the linear figures alone are stated, sooner.
 
     Returns
     -------
@@ -189,36 +241,45 @@ def convert(
     >>> conv.verdict, round(conv.settings["K"].value, 4), conv.settings["Ti"].value, conv.settings["Td"].value
     ('exact', 2.6667, 20.0, 3.75)
     """
-    if match is not None and match not in MATCHES:
-        raise SettingError(f"match is '{match}'; it is one of {', '.join(MATCHES)}")
+    aim = read_aim(match)
     card = target if isinstance(target, Card) else load_card(target)
     _refuse_recursions(source, card)
     factor = _rescaling(source, pv_range, op_range)
     scans = _scans(scan)
     same = source.card.id == card.id
-    chosen = {**(source.options if same else {}), **_named_as(card, options or {})}
+    taken = {**(source.options if same else {}), **_named_as(card, options or {})}
     fixed = {**_shared(source, card), **(given or {})}
+    if scans is not None:
+        source.law(scans[0])  # refuses an interval that is none
 
     def solver(named: Mapping[str, object]) -> Solver:
         goal = Target(card, named, fixed, pv_range or source.pv_range, op_range or source.op_range)
         goal.reject_missing()
-        return Solver(source, goal, -factor if _is_negative(source, goal) else factor, scans)
+        sign = -1 if _is_negative(source, goal) else 1
+        return Solver(source, goal, sign * factor, scans, process, compensate=compensate)
 
-    work = solver(chosen)
-    settings, how, refusal = work.solve(match)
-    certificate = None if settings is None else work.certify(settings)
-    better = better_options(card, chosen, None if refusal else certificate, solver) if match in (None, "exact") else None
-    if refusal and better is not None:
-        refusal = f"{refusal}; other options would do: {better}"
-    if settings is None or certificate is None:
-        raise ConversionRefusedError(refusal)
+    ranking = attempts(card, taken, solver, aim, every=all_options)
+    best = ranking[0]
+    work, settings, how, refusal = best.solver, best.settings, best.match, ""
+    if settings is None or work is None:
+        first = min(ranking, key=lambda a: len(a.changed))
+        if first.solver is None or first.error is None:
+            raise first.error or ConversionRefusedError(f"{card.id} has no options left to try")
+        work = first.solver
+        settings, refusal = work.refused(first.error)
+        if settings is None:
+            raise ConversionRefusedError(refusal)
+        best, how = first, "constrained"
+    exact_dials = settings
     if round_dials:
         settings, rounded = _rounded(settings)
-        before = certificate.feedback if rounded else None
-        certificate = replace(work.certify(settings), dials=rounded, feedback_before_rounding=before)
-    better = None if refusal else better
-    book = _textbook(work)
-    conversion = Conversion(source, settings, how, certificate, book, (), refusal, better, work.factor, scans)
+    certificate = full_certificate(work, settings, emulate=emulate)
+    if round_dials and rounded:
+        before = work.certify(exact_dials).feedback
+        certificate = replace(certificate, dials=rounded, feedback_before_rounding=before)
+    conversion = Conversion(
+        source, settings, how, certificate, _textbook(work), (), refusal, dict(best.changed), ranking, work.factor, scans, process
+    )
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if refusal and not allow_approximate:
         raise ConversionRefusedError(refusal, conversion)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ import numpy.typing as npt
 from pidemu.conversion.certificate import Band, Certificate, Kick, PathComparison
 from pidemu.law import Law, PathName
 from pidemu.rational import Response
+
+if TYPE_CHECKING:
+    from pidemu.process import Process
 
 Floats = npt.NDArray[np.float64]
 
@@ -30,7 +33,7 @@ def time_scale(law: Law) -> float:
     return abs(m2 / m1) if m1 and m2 else 1.0
 
 
-def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[float, float]]:
+def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return loop band and full band of a source [rad/s] (section 9).
 
     Parameters
@@ -39,13 +42,16 @@ def bands(law: Law, scan: float | None) -> tuple[tuple[float, float], tuple[floa
         The source's continuous law.
     scan : float or None
         The longer scan interval [s], whose Nyquist frequency ends both bands.
+    process : Process, optional
+        The process, where it is known: the loop band then ends at twice the frequency where its phase is -180 degrees.
     """
     Ti = time_scale(law)
     _, m1, m2 = law.moments()
     Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
     nyquist = math.pi / scan if scan is not None else math.inf
     low = 0.01 / Ti
-    loop = max(min(5 / Ti, nyquist), low * 1.01)
+    end = 5 / Ti if process is None or not math.isfinite(process.w180) else 2 * process.w180
+    loop = max(min(end, nyquist), low * 1.01)
     return (low, loop), (low, max(min(100 / Td, nyquist), loop))
 
 
@@ -86,7 +92,7 @@ def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Res
 def compare_paths(
     source: Law, target: Law, path: PathName, limits: tuple[tuple[float, float], tuple[float, float]], factor: float
 ) -> PathComparison:
-    """Compare one path of two laws over loop band and full band.
+    """Compare one path of two laws over loop band and full band, discrete ones as a process sees them, held from scan to scan.
 
     Parameters
     ----------
@@ -99,14 +105,24 @@ def compare_paths(
     factor : float
         What the source's gain is multiplied by for new signal ranges.
     """
-
-    def scaled(w: Floats) -> Response:
-        return factor * source.response(w, path)
-
-    loop, full = (compare(scaled, lambda w: target.response(w, path), low, high) for low, high in limits)
+    loop, full = (_compared(source, target, path, band, factor) for band in limits)
     worse = loop if loop.max_deviation > full.max_deviation else full  # the full band holds the loop band
     gain, phase = max(loop.gain_db, full.gain_db), max(loop.phase_deg, full.phase_deg)
     return PathComparison(loop, Band(full.low, full.high, worse.max_deviation, gain, phase, worse.worst_at))
+
+
+def _compared(source: Law, target: Law, path: PathName, band: tuple[float, float], factor: float) -> Band:
+    return compare(lambda w: factor * source.held(w, path), lambda w: target.held(w, path), *band)
+
+
+def deviation(source: Law, target: Law, band: tuple[float, float], factor: float) -> float:
+    """Return the largest relative deviation of the feedback paths over one band; arguments as in `compare_paths`."""
+    return _compared(source, target, "feedback", band, factor).max_deviation
+
+
+def scan_phase(w: float, scans: tuple[float, float]) -> float:
+    """Return the phase that a hold of the target's interval loses against one of the source's at `w` [rad/s], in degrees."""
+    return math.degrees(w * (scans[1] - scans[0]) / 2)
 
 
 def certify(
@@ -114,8 +130,9 @@ def certify(
     target: Law,
     at_scan: tuple[Law, Law] | None,
     factor: float = 1.0,
+    process: Process | None = None,
 ) -> Certificate:
-    """Return the certificate of two controllers.
+    """Return the linear part of the certificate of two controllers.
 
     Parameters
     ----------
@@ -125,9 +142,11 @@ def certify(
         The discrete laws of source and target at their scan intervals.
     factor : float
         What the source's gain is multiplied by for new signal ranges.
+    process : Process, optional
+        The process, which places the end of the loop band.
     """
     scans = [law.scan for law in at_scan or () if law.scan is not None]
-    limits = bands(source, max(scans) if scans else None)
+    limits = bands(source, max(scans) if scans else None, process)
     discrete = [compare_paths(*at_scan, path, limits, factor) for path in _PATHS] if at_scan else [None, None]
     return Certificate(
         feedback=compare_paths(source, target, "feedback", limits, factor),

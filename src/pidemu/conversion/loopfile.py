@@ -24,6 +24,7 @@ class LoopFile(Model):
     set_: dict[Text, str | Number] = Field(
         default={}, description="Options of the target, and dials that shall have a value.", alias="set"
     )
+    process: Text | None = Field(default=None, description="The process, as `--process` takes it: gain=1.5,lag=10,delay=3.")
     scan: Number | list[Number] | None = Field(
         default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
     )
@@ -48,6 +49,7 @@ class Loop:
     to: str | None
     set: dict[str, Any]
     scan: tuple[float, float] | None
+    process: str | None = None
 
 
 def read_loop(file: Path) -> Loop:
@@ -72,4 +74,4 @@ def read_loop(file: Path) -> Loop:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
     intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
     scan = (intervals[0], intervals[-1]) if intervals else None
-    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan)
+    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process)

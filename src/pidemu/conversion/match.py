@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from pidemu.algorithm import Algorithm
@@ -154,15 +154,15 @@ def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: T
         yield Numbers(K, n0, K * lead, free)
 
 
-def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers, ...]:
-    """Return the numbers for which the moments ``m0, m1, m2`` of the feedback path agree, the filter being fixed.
+def low_frequency(moments: Sequence[float], target: Target, filt: TargetFilter) -> tuple[Numbers, ...]:
+    """Return the numbers for which the feedback path of the target has the moments ``m0, m1, m2``, the filter being fixed.
 
     A series form has two such solutions; the one with ``Ti >= Td`` comes first.
 
     Parameters
     ----------
-    law : Law
-        The source's law.
+    moments : sequence of float
+        ``m0`` [1/s], ``m1`` [-] and ``m2`` [s].
     target : Target
         The target.
     filt : TargetFilter
@@ -173,7 +173,7 @@ def low_frequency(law: Law, target: Target, filt: TargetFilter) -> tuple[Numbers
     NoMatchError
         There are none.
     """
-    m0, m1, m2 = law.moments()
+    m0, m1, m2 = moments
     m2 = _clean(m2, abs(m1 * m1 / m0) if m0 else abs(m2))
     if not target.has_proportional:
         return (_without_proportional(m0, m2, target, target.idle_gain),)
@@ -265,8 +265,11 @@ def textbook(source: Algorithm, dial_kd: float, target: Target) -> Numbers:
     return Numbers(K, ki, K * lead)
 
 
-def weights(law: Law, target: Target, feedback: Algorithm) -> tuple[float | None, float | None]:
-    """Return the free setpoint weights b and c for which the setpoint paths' moments agree (specs/equations.md, section 2).
+def weights(law: Law, target: Target, feedback: Algorithm, scan: float | None = None) -> tuple[float | None, float | None]:
+    """Return the free setpoint weights b and c for which the setpoint paths' moments agree (specs/equations.md, sections 2 and 3).
+
+    The moments ``m1`` and ``m2`` of the setpoint path are linear in b and c. Both laws are continuous, or both as a process sees
+    them at their scan intervals.
 
     Parameters
     ----------
@@ -276,18 +279,32 @@ def weights(law: Law, target: Target, feedback: Algorithm) -> tuple[float | None
         The target.
     feedback : Algorithm
         The target's algorithm with its feedback path matched.
+    scan : float, optional
+        The target's scan interval [s], where `law` is discrete.
     """
-    m0, m1, m2 = law.moments("setpoint")
-    a = feedback
-    if a.filter_on == "output" and a.Tf:
-        m1, m2 = m1 + a.Tf * m0, m2 + a.Tf * m1
-    per_gain = a.ki / a.kp if a.kp else 0.0
-    shrink = 1 - a.Tf * per_gain if a.series and a.filter_on == "term" else 1.0
-    c = m2 / (a.kd * shrink) if a.kd and shrink else None
-    c_free, b_free = target.may_choose(Role.DERIVATIVE_WEIGHT), target.may_choose(Role.PROPORTIONAL_WEIGHT)
-    held = (c if c is not None else 0.0) if c_free else a.c
-    b = (m1 - (held * a.kd * per_gain if a.series else 0.0)) / a.kp if a.kp else None
-    return _snapped(b) if b_free else None, _snapped(c) if c_free else None
+    c_free = target.may_choose(Role.DERIVATIVE_WEIGHT) and feedback.kd != 0
+    b_free = target.may_choose(Role.PROPORTIONAL_WEIGHT) and feedback.kp != 0
+    if not (b_free or c_free):
+        return None, None
+    held = (0.0 if b_free else feedback.b, 0.0 if c_free else feedback.c)
+
+    def moments(b: float, c: float) -> tuple[float, ...]:
+        return Law(replace(feedback, b=b, c=c), scan).held_expansion(3, "setpoint")[1:]
+
+    base = moments(*held)
+    wanted = [w - x for w, x in zip(law.held_expansion(3, "setpoint")[1:], base, strict=True)]
+    by_b = [x - y for x, y in zip(moments(1.0, held[1]), base, strict=True)]
+    by_c = [x - y for x, y in zip(moments(held[0], 1.0), base, strict=True)]
+    if not c_free:
+        return _snapped(wanted[0] / by_b[0]) if by_b[0] else None, None
+    if not b_free:
+        return None, _snapped(wanted[1] / by_c[1]) if by_c[1] else None
+    determinant = by_b[0] * by_c[1] - by_c[0] * by_b[1]
+    if abs(determinant) <= _ROUNDING * (abs(by_b[0] * by_c[1]) + abs(by_c[0] * by_b[1])):
+        return None, None
+    b = (wanted[0] * by_c[1] - by_c[0] * wanted[1]) / determinant
+    c = (by_b[0] * wanted[1] - wanted[0] * by_b[1]) / determinant
+    return _snapped(b), _snapped(c)
 
 
 def _snapped(weight: float | None) -> float | None:

@@ -124,7 +124,7 @@ def _cost(target: Target, sign: float, K: Any, ki: Any, Td: Any, w: Any, wanted:
     """Return the largest relative deviation over the frequencies, for every combination."""
     grid = [np.asarray(x, dtype=float)[..., None] for x in (K, ki, Td)]
     with np.errstate(all="ignore"):
-        a = target.algorithm_at(sign * grid[0], grid[0] / grid[1], grid[2])
+        a = target.algorithm_of(Numbers(sign * grid[0], sign * grid[1], sign * grid[0] * grid[2]))
         response = paths(a, at_frequencies(w))[0]
         deviation = np.max(np.abs(response / wanted - 1), axis=-1)
     result: npt.NDArray[np.float64] = np.where(np.isfinite(deviation), deviation, np.inf)

@@ -42,7 +42,7 @@ class Numbers:
     Attributes
     ----------
     K : float
-        Gain [%/%].
+        Gain [%/%]. The first three may be arrays in `Target.algorithm_of`.
     ki : float
         Integral gain, ``K/Ti`` in the standard and series forms [1/s].
     kd : float
@@ -55,9 +55,9 @@ class Numbers:
         Overall multiplier, where the conversion chooses one; ``None``: as it is.
     """
 
-    K: float
-    ki: float
-    kd: float
+    K: Any
+    ki: Any
+    kd: Any
     Tf: float | None = None
     b: float | None = None
     c: float | None = None
@@ -335,16 +335,23 @@ class Target:
             raise SettingError(f"{f.setting} would have to be infinite: this target always filters its derivative")
         return {f.setting: self._in_reach(f.setting, setting, base / Tf)}
 
-    def algorithm_at(self, K: Any, Ti: Any, Td: Any) -> Algorithm:
-        """Return the target's algorithm for arrays of gain, integral time [s] and derivative time [s], filter as fixed.
+    def algorithm_of(self, n: Numbers) -> Algorithm:
+        """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
+        f, scale = self.filter, self.multiplier if n.multiplier is None else n.multiplier
+        parallel = self.form is Form.PARALLEL
+        scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        time = n.kd / scale if parallel else n.kd / n.K if self.has_proportional or not _is_zero(n.K) else 0.0
+        base = time / (1 + time * n.ki / n.K) if f.effective else time
+        Tf = n.Tf if n.Tf is not None else f.time if f.kind == "time" else f.ratio * base
+        if f.kind != "time" and isinstance(base, float) and base == 0:
+            Tf = 0.0
+        kd = n.kd - n.K * Tf if f.lead_lag else n.kd
+        b, c = (own if x is None else x for own, x in ((self.shape.b, n.b), (self.shape.c, n.c)))
+        return replace(self.shape, kp=n.K if self.has_proportional else 0.0, ki=n.ki, kd=kd, Tf=Tf, b=b, c=c)
 
-        In the parallel form ``Ti = kp/ki`` and ``Td = kd/kp``.
-        """
-        f = self.filter
-        base = Td / (1 + Td / Ti) if f.effective else Td * K if self.form is Form.PARALLEL and f.kind != "time" else Td
-        Tf = f.time if f.kind == "time" else f.ratio * base / (self.multiplier if self.form is Form.PARALLEL else 1.0)
-        kd = K * (Td - Tf) if f.lead_lag else K * Td
-        return replace(self.shape, kp=K if self.has_proportional else 0.0, ki=K / Ti, kd=kd, Tf=Tf)
+
+def _is_zero(x: Any) -> bool:
+    return isinstance(x, float | int) and x == 0
 
 
 def _placeholder(setting: Setting) -> float:

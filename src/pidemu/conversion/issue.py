@@ -1,0 +1,44 @@
+"""The whole certificate of a conversion, issued: linear figures, emulations, nonlinear differences, the loop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pidemu.conversion.certificate import Certificate
+from pidemu.conversion.nonlinear import nonlinear_differences
+from pidemu.conversion.scanwise import common_interval, emulated
+from pidemu.conversion.solve import Solver
+from pidemu.errors import ScanError
+from pidemu.record.standard import scale_of
+from pidemu.settings import Settings
+
+
+def full_certificate(work: Solver, settings: Settings, *, emulate: bool) -> Certificate:
+    """Return the certificate of a conversion's settings (specs/equations.md, section 9).
+
+    Parameters
+    ----------
+    work : Solver
+        The conversion.
+    settings : Settings
+        The target's settings.
+    emulate : bool
+        Whether both controllers are emulated, for the points 3, 5 and 6.
+    """
+    certificate = replace(work.certify(settings), scan_cost=work.scan_cost(settings))
+    if not emulate:
+        return certificate
+    source = work.source
+    try:
+        scans = work.scans or (common_interval(source, settings),) * 2
+        both = emulated(source, settings, scans, work.factor, taken=work.scans is None)
+    except ScanError as error:
+        return replace(certificate, not_emulated=str(error))
+    certificate = replace(
+        certificate, scan_by_scan=both, nonlinear=nonlinear_differences(source, settings, scans, scale_of(source, scans[0]))
+    )
+    if work.process is None:
+        return certificate
+    from pidemu.simulation import compare_loops
+
+    return replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))
