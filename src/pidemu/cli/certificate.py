@@ -6,13 +6,18 @@ import click
 
 from pidemu.card.load import Card
 from pidemu.cli.common import heading, number, print_json, table, wrapped
-from pidemu.conversion.certificate import EXACT, Band, Certificate, LoopComparison, PathComparison
+from pidemu.conversion.certificate import Certificate, LoopComparison
 from pidemu.conversion.choices import Attempt
 from pidemu.conversion.convert import Conversion
 from pidemu.conversion.cutover import TransferPlan
+from pidemu.conversion.figures import BAND_COLUMNS, band_rows, emulation_line, kick_line, loop_rows, rounding_line, textbook_line
+from pidemu.conversion.figures import decibels as _db
+from pidemu.conversion.figures import degrees as _deg
+from pidemu.conversion.figures import other_units as _other_units
+from pidemu.conversion.figures import percent as _percent
+from pidemu.conversion.figures import unit_of as _unit
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings, Value
-from pidemu.units import Role
+from pidemu.settings import Settings
 
 
 def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, as_json: bool) -> None:
@@ -83,41 +88,7 @@ def _ranked(a: Attempt) -> list[str]:
 
 def _loop(loop: LoopComparison) -> None:
     heading(f"\nThe loop with the process {loop.process}")
-    names = (
-        "gain margin",
-        "phase margin [deg]",
-        "delay margin [s]",
-        "crossover [rad/s]",
-        "Ms",
-        "Mt",
-        "IAE, load step of 1 % [% s]",
-    )
-    rows = []
-    for name, attribute in zip(names, ("gain_margin", "phase_margin", "delay_margin", "crossover", "Ms", "Mt", "iae"), strict=True):
-        rows.append([name, *(number(float(f"{getattr(x, attribute):.4g}")) for x in (loop.source, loop.target))])
-    rows.append(["stable", *("yes" if x.stable else "NO" for x in (loop.source, loop.target))])
-    table(["", "before", "after"], rows, right=(1, 2))
-
-
-def _unit(v: Value) -> str:
-    return "" if v.unit == "1" else v.unit
-
-
-def _other_units(v: Value) -> str:
-    """Return an integral or gain dial in the other usual unit, so that nobody has to convert in the head."""
-    if v.off:
-        return "off"
-    if v.role is Role.INTEGRAL and "repeat" in v.unit:
-        other = "repeat/min" if v.unit == "s/repeat" else "s/repeat"
-    elif v.role is Role.INTEGRAL and v.unit in ("s", "min"):
-        other = "repeat/min"
-    elif v.role in (Role.DERIVATIVE, Role.INTEGRAL) and "min" in v.unit:
-        other = v.unit.replace("min", "s")
-    elif v.role is Role.GAIN and v.unit == "%":
-        other = "%/%"
-    else:
-        return ""
-    return f"= {number(v.to(other))} {other}"
+    table(["", "before", "after"], loop_rows(loop), right=(1, 2))
 
 
 def _side(title: str, s: Settings) -> None:
@@ -142,66 +113,10 @@ def _target(c: Conversion) -> None:
 
 
 def _figures(c: Certificate) -> None:
-    rows = [*_rows("feedback (PV)", c.feedback), *_rows("setpoint", c.setpoint)]
-    if c.feedback_at_scan is not None and c.setpoint_at_scan is not None:
-        rows += [
-            *_rows("feedback, at the scans", c.feedback_at_scan),
-            *_rows("setpoint, at the scans", c.setpoint_at_scan),
-        ]
-    table(["path", "band", "rad/s", "deviation", "gain", "phase"], rows, right=(3, 4, 5))
-    _emulation(c)
-    if c.setpoint_kick_at_scan is not None:
-        first = c.setpoint_kick_at_scan
-        click.echo(
-            "  setpoint kick, output step in the first scan: "
-            f"{number(first.source)} on the source, {number(first.target)} on the target"
-        )
-        return
-    kick = c.setpoint_kick
-    click.echo(
-        "  setpoint kick (output step per setpoint step, at once): "
-        f"{number(kick.source)} on the source, {number(kick.target)} on the target"
-    )
-
-
-def _emulation(c: Certificate) -> None:
-    e = c.scan_by_scan
-    if e is None:
-        return
-    scans = f"{number(e.scan[0])} s" if e.scan[0] == e.scan[1] else f"{number(e.scan[0])} s and {number(e.scan[1])} s"
-    taken = " (taken, as none was given)" if e.taken else ""
-    if e.is_exact:
-        wrapped(f"run against each other every {scans}{taken} without limits: the same output, scan by scan", "  ")
-        return
-    still = "none" if e.is_exact_on_measurement else f"{number(float(f'{e.on_measurement:.2g}'))} %"
-    wrapped(
-        f"run against each other every {scans}{taken} without limits: outputs differ by up to "
-        f"{number(float(f'{e.largest:.2g}'))} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
-        f"{number(float(f'{e.size:.3g}'))} %), while the setpoint rests: {still}",
-        "  ",
-    )
-
-
-def _rows(title: str, p: PathComparison) -> list[list[str]]:
-    out = []
-    for name, band in (("loop band", p.loop_band), ("full band", p.full_band)):
-        out.append([title, name, f"{band.low:.3g} to {band.high:.3g}", _percent(band.max_deviation), _db(band), _deg(band)])
-        title = ""
-    return out
-
-
-def _percent(deviation: float) -> str:
-    if deviation < EXACT:
-        return "none"
-    return f"{number(float(f'{100 * deviation:.2g}'))} %" if deviation < 10 else "over 1000 %"
-
-
-def _db(band: Band) -> str:
-    return f"{band.gain_db:.2f} dB"
-
-
-def _deg(band: Band) -> str:
-    return f"{band.phase_deg:.1f} deg"
+    table(BAND_COLUMNS, band_rows(c), right=(3, 4, 5))
+    if c.scan_by_scan is not None:
+        wrapped(emulation_line(c), "  ")
+    click.echo(f"  {kick_line(c)}")
 
 
 def _rounding(conversion: Conversion, asked: bool) -> None:
@@ -213,23 +128,14 @@ def _rounding(conversion: Conversion, asked: bool) -> None:
         return
     heading("\nRounded to the dials' resolution")
     table(["", "exact", "rounded"], [[d.name, number(d.exact), number(d.rounded)] for d in c.dials], right=(1, 2))
-    before = c.feedback_before_rounding
-    if before is not None:
-        old, new = before.loop_band.max_deviation, c.feedback.loop_band.max_deviation
-        click.echo(f"  deviation in the loop band before rounding: {_percent(old)}, after: {_percent(new)}")
+    if c.feedback_before_rounding is not None:
+        click.echo(f"  {rounding_line(c)}")
 
 
 def _textbook(c: Conversion) -> None:
-    book = c.textbook
-    if book.certificate is None:
-        wrapped(f"the textbook rule has no answer: {book.reason}", "  ")
-    elif c.match != "textbook" and book.certificate.feedback.loop_band.max_deviation < EXACT:
-        click.echo("  the textbook rule gives the same law for measurement")
-    elif c.match != "textbook":
-        band = book.certificate.feedback.loop_band
-        click.echo(
-            f"  the textbook rule would deviate by {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band"
-        )
+    line = textbook_line(c)
+    if line:
+        wrapped(line, "  ")
 
 
 def _list(title: str, items: tuple[str, ...]) -> None:

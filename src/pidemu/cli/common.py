@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pidemu.card.load import Card
+from pidemu.conversion.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.errors import SettingError
 
 if TYPE_CHECKING:
@@ -106,14 +107,6 @@ def split_options(card: Card, given: Mapping[str, object]) -> tuple[dict[str, ob
     options = {o.casefold() for o in card.options}
     chosen = {k: v for k, v in given.items() if k.casefold() in options}
     return chosen, {k: v for k, v in given.items() if k not in chosen}
-
-
-def number(x: float) -> str:
-    """Return a number in six significant digits, as people write it."""
-    if math.isinf(x):
-        return "inf" if x > 0 else "-inf"
-    text = f"{x:.6g}"
-    return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
 
 
 def heading(text: str) -> None:
