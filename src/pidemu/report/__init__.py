@@ -1,0 +1,1 @@
+"""Reports: what a conversion amounts to, as a page to print."""
