@@ -1,0 +1,167 @@
+"""Every figure on docs/conversion.md is recomputed: the code is run, the tables are rebuilt, the text holds no other numbers."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import pidemu
+from pidemu.card.load import Card
+from pidemu.conversion.linear import bands, deviation
+from pidemu.settings import Settings
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "conversion.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+SPEC = (ROOT / "specs" / "equations.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+TABLE = re.compile(r"^<!-- recomputed: (\w+) -->\n((?:\|.*\n)+)", re.MULTILINE)
+NUMBER = re.compile(r"(?<![\w.^])\d+(?:\.\d+)?(?:e-?\d+)?(?!\w|\.\d)")
+DIGITS = {float(i) for i in range(10)}
+"""Bare digits are words of formulas: orders, squares, sections."""
+
+
+def statements(block: str) -> list[tuple[str, str, bool]]:
+    """Return each statement of a block, what its comment says it gives, and whether it is an expression."""
+    lines = block.splitlines()
+    found = []
+    for node in ast.parse(block).body:
+        assert node.end_lineno is not None
+        code = "\n".join(lines[node.lineno - 1 : node.end_lineno])
+        comment = lines[node.end_lineno - 1].partition("  # ")[2]
+        found.append((code, comment, isinstance(node, ast.Expr)))
+    return found
+
+
+def test_the_code_of_the_page_gives_what_its_comments_say() -> None:
+    names: dict[str, Any] = {}
+    checked = 0
+    for block in BLOCK.findall(TEXT):
+        for code, expected, is_expression in statements(block):
+            if not is_expression:
+                exec(code, names)
+                continue
+            assert expected, f"says nothing: {code}"
+            assert eval(code.partition("  # ")[0], names) == ast.literal_eval(expected), code
+            checked += 1
+    assert checked > 30
+
+
+def rules() -> list[list[str]]:
+    """Rebuild the table of section 4: textbook rule against low-frequency match."""
+    at = [0.1, 0.3, 1, 3, 10]
+    source = pidemu.load_card("generic/series").settings(K=1, Ti=1, Td=0.25, alpha=0.1)
+    rows = [["frequency x Ti", *(f"{w:g}" for w in at)]]
+    for match in ("textbook", "low-frequency"):
+        found = pidemu.convert(source, "emerson/deltav", given={"ALPHA": 0.125}, match=match, emulate=False).settings
+        ratios = [complex(found.law().response(w) / source.law().response(w)) for w in at]
+        cells = [f"{abs(20 * math.log10(abs(r))):.2f} / {abs(math.degrees(math.atan2(r.imag, r.real))):.1f}" for r in ratios]
+        rows.append([match, *cells])
+    return rows
+
+
+def _from_per_scan(card: Card, numbers: tuple[float, ...], h: float) -> Settings:
+    """Return the settings that a recursion with these P, I and D per scan amounts to at an interval [s]."""
+    P, per_scan, D = numbers
+    return card.settings(kp=P, ki=per_scan / h, kd=D * h)
+
+
+def scaled() -> list[list[str]]:
+    """Rebuild the table of section 7: what becomes of settings at half the scan interval."""
+    card = pidemu.load_card("generic/parallel")
+    kp, ki, kd, h = 2.0, 0.1, 8.0, 1.0
+    half, ratio = h / 2, 1 / 2
+    source = card.settings(kp=kp, ki=ki, kd=kd)
+    band = bands(source.law(), h)[0]
+    made_up = pidemu.convert(source, card, scan=(h, half), emulate=False).settings
+    per_scan = kp, ki * h, kd / h
+    entered = {
+        "the settings made up for the interval": made_up,
+        "the same settings, per second": source,
+        "the gain halved on a standard form": card.settings(kp=kp * ratio, ki=ki * ratio, kd=kd * ratio),
+        "numbers per scan, copied": _from_per_scan(card, per_scan, half),
+        "numbers per scan, all halved": _from_per_scan(card, tuple(ratio * x for x in per_scan), half),
+    }
+    rows = [["what is entered at 0.5 s", "kp", "ki", "kd", "deviation"]]
+    for name, s in entered.items():
+        off = deviation(source.law(h), s.law(half), band, 1.0)
+        rows.append([name, *(f"{s[dial].value:.6g}" for dial in ("kp", "ki", "kd")), f"{off:.1%}".replace("%", " %")])
+    return rows
+
+
+def worked() -> list[list[str]]:
+    """Rebuild the table of section 9: the worked conversion."""
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    dials = {"GAIN": ".4f", "RESET": ".3f", "RATE": ".4f", "ALPHA": ".4f", "BETA": ".4f", "GAMMA": ".4f"}
+    rows = [["STRUCTURE", "scans, s", *dials, "verdict", "feedback", "setpoint", "all", "at rest"]]
+    for structure, scan in (("1", (1, 1)), ("1", (1, 0.5)), ("7", (1, 1)), ("7", (1, 0.5)), ("2", (1, 1))):
+        c = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": structure}, scan=scan)
+        cells = [f"{c.settings[n].value:{f}}" if c.settings[n].active else "-" for n, f in dials.items()]
+        setpoint, run = c.certificate.setpoint_at_scan, c.certificate.scan_by_scan
+        assert setpoint is not None
+        assert run is not None
+        paths = [f"{p.loop_band.max_deviation:.1%}".replace("%", " %") for p in (c.certificate.headline, setpoint)]
+        rows.append(
+            [structure, f"{scan[0]}, {scan[1]}", *cells, c.verdict, *paths, f"{run.largest:.2f}", f"{run.on_measurement:.2f}"]
+        )
+    return rows
+
+
+REBUILT: dict[str, Callable[[], list[list[str]]]] = {"rules": rules, "scaled": scaled, "worked": worked}
+
+
+def cells(table: str) -> list[list[str]]:
+    rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in table.splitlines()]
+    return [row for row in rows if not set("".join(row)) <= {"-"}]
+
+
+@pytest.mark.parametrize("name", REBUILT)
+def test_a_table_of_the_page_is_what_is_recomputed(name: str) -> None:
+    assert cells(dict(TABLE.findall(TEXT))[name]) == REBUILT[name]()
+
+
+def test_every_table_that_is_marked_so_is_recomputed() -> None:
+    assert [name for name, _ in TABLE.findall(TEXT)] == list(REBUILT)
+
+
+def test_the_table_of_the_two_rules_is_that_of_the_specification() -> None:
+    assert dict(TABLE.findall(TEXT))["rules"] in SPEC
+
+
+def test_every_figure_in_the_text_stands_in_the_code_or_in_a_table_that_is_recomputed() -> None:
+    shown = "\n".join([*BLOCK.findall(TEXT), *(table for _, table in TABLE.findall(TEXT))])
+    known = {float(x) for x in NUMBER.findall(shown)} | DIGITS
+    text = TABLE.sub("", BLOCK.sub("", TEXT))
+    assert [x for x in NUMBER.findall(text) if float(x) not in known] == []
+
+
+def table_of(text: str, header: str) -> list[list[str]]:
+    """Return the body of the table whose header begins so."""
+    found = re.search(rf"^{re.escape(header)}.*\n(?:\|.*\n)+", text, re.MULTILINE)
+    assert found is not None
+    return cells(found[0])[1:]
+
+
+@pytest.mark.parametrize(
+    ("page", "spec", "columns"),
+    [
+        ("| integral rule | s C(z)", "| integral rule | s C,", [0, 1, 3, 4]),
+        ("| integral rule | q0", "| integral rule | q0", [0, 1, 2, 3]),
+    ],
+)
+def test_the_formulas_of_the_scan_rules_are_those_of_the_specification_which_are_proven(
+    page: str, spec: str, columns: list[int]
+) -> None:
+    mine, theirs = (table_of(text.replace("`", ""), header) for text, header in ((TEXT, page), (SPEC, spec)))
+    assert mine == [[row[i] for i in columns] for row in theirs]
+
+
+@pytest.mark.parametrize("target", re.findall(r"\]\(([^)#]+)\)", TEXT))
+def test_every_link_of_the_page_leads_somewhere(target: str) -> None:
+    assert (PAGE.parent / target).exists()
