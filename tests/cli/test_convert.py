@@ -14,7 +14,7 @@ from tests.cli.helpers import said, strict_json, told
 
 PROVOX = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav")
 PI = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "--to", "emerson/deltav")
-REFUSED = ("convert", "honeywell/tdc3000", "K=1", "T1=1", "T2=30", "--to", "emerson/deltav")
+REFUSED = ("convert", "honeywell/tdc3000", "K=1", "T1=1", "T2=30", "--to", "emerson/deltav", "--set", "FORM=Standard")
 HOPELESS = (*PI, "--set", "STRUCTURE=4")
 
 
@@ -48,9 +48,10 @@ def test_convert_prints_both_sides_the_verdict_and_the_figures() -> None:
         ["RESET", "4", "repeat/min", "=", "15", "s/repeat"],
         ["RATE", "0.1", "min", "=", "6", "s"],
     ]
-    assert parts["To"][1][:6] == ["GAIN", "2.7", "%/%", "2.8"]
-    assert parts["To"][2][:3] == ["RESET", "20.25", "s/repeat"]
-    assert parts["Verdict"][0][0] == "exact-feedback:"
+    assert parts["To"][2][:6] == ["GAIN", "2.7", "%/%", "2.8"]
+    assert parts["To"][3][:3] == ["RESET", "20.25", "s/repeat"]
+    assert parts["To"][0][-3:] == ["STRUCTURE=7;", "--set", "decides"]
+    assert parts["Verdict"][0][0] == "exact:"
     assert ["feedback", "(PV)", "loop", "band"] in [row[:4] for row in parts["Verdict"]]
 
 
@@ -67,9 +68,10 @@ def test_convert_as_json_holds_what_programs_need() -> None:
         "options": {},
     }
     assert {"card", "settings", "options"} == set(found["to"])
-    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "1"}
+    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "7"}
+    assert found["chosen"] == {"STRUCTURE": "7"}
     assert found["to"]["settings"]["RESET"] == {"value": 20.25, "unit": "s/repeat"}
-    assert found["verdict"] == "exact-feedback"
+    assert found["verdict"] == "exact"
     assert {"feedback", "setpoint"} <= set(found["certificate"])
 
 

@@ -49,14 +49,15 @@ def test_the_textbook_column_is_what_the_textbook_match_gives(source: str, targe
     settings = dict(SOURCES)[source]
     held = {} if source == target else needed(pidemu.load_card(target))
     try:
-        shown = pidemu.convert(settings, target, given=held).textbook
+        conversion = pidemu.convert(settings, target, given=held, emulate=False)
+        shown = conversion.textbook
     except ConversionRefusedError:
         return
     if shown.settings is None:
         with pytest.raises(ConversionRefusedError):
-            pidemu.convert(settings, target, given=held, match="textbook")
+            pidemu.convert(settings, target, given=held, match="textbook", options=conversion.settings.options)
     else:
-        asked = pidemu.convert(settings, target, given=held, match="textbook")
+        asked = pidemu.convert(settings, target, given=held, match="textbook", options=shown.settings.options)
         assert {n: v.value for n, v in shown.settings.items()} == {n: v.value for n, v in asked.settings.items()}
         assert shown.certificate is not None
         assert shown.certificate.feedback == asked.certificate.feedback
@@ -76,24 +77,68 @@ def test_weights_above_one_are_kept() -> None:
     assert (conversion.verdict, conversion.settings["b"].value) == ("exact", 1.5)
 
 
-def test_a_refusal_names_the_options_that_would_do() -> None:
+def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -> None:
     source = pidemu.load_card("emerson/deltav").settings(GAIN=2, STRUCTURE="4")
-    with pytest.raises(ConversionRefusedError, match="other options would do: --set MODE=P: exact"):
-        pidemu.convert(source, "foxboro/ia-pid")
+    conversion = pidemu.convert(source, "foxboro/ia-pid")
+    assert dict(conversion.chosen) == {"MODE": "P"}
+    assert conversion.verdict == "exact"
+    with pytest.raises(ConversionRefusedError, match="has no derivative action|cannot be switched off|cannot do"):
+        pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "PID"})
 
 
-def test_a_better_choice_of_options_is_named() -> None:
+def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    assert pidemu.convert(source, "emerson/deltav").better == "--set STRUCTURE=7: exact"
-    better = pidemu.convert(source, "honeywell/tdc3000").better
-    assert better is not None
-    assert better.startswith("--set CTEQN=B: approximate, deviation of the setpoint path ")
+    conversion = pidemu.convert(source, "emerson/deltav")
+    assert dict(conversion.chosen) == {"STRUCTURE": "7"}
+    assert conversion.verdict == "exact"
+    series = pidemu.convert(source, "honeywell/tdc3000")
+    assert dict(series.chosen) == {"CTEQN": "B"}  # D on the measurement, as with PROVOX
+    other = pidemu.convert(source, "honeywell/tdc3000", options={"CTEQN": "A"})
+    least, more = (c.certificate.setpoint.loop_band.max_deviation for c in (series, other))
+    assert least < more / 2
 
 
-def test_options_that_the_user_chose_are_not_questioned() -> None:
+def test_options_that_the_user_chose_are_kept() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    options = {"FORM": "Standard", "STRUCTURE": "1"}
-    assert pidemu.convert(source, "emerson/deltav", options=options).better is None
+    conversion = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": "1"})
+    assert conversion.settings.options == {"FORM": "Standard", "STRUCTURE": "1"}
+    assert dict(conversion.chosen) == {}
+    assert conversion.verdict == "exact-feedback"
+
+
+def test_the_defaults_stay_where_no_choice_does_better() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    conversion = pidemu.convert(source, "emerson/deltav")
+    assert dict(conversion.chosen) == {}
+    assert conversion.verdict == "exact"
+
+
+def test_every_choice_is_ranked_on_request_and_no_later_one_has_a_better_verdict() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    ranking = pidemu.convert(source, "emerson/deltav", all_options=True).ranking
+    assert len(ranking) == 16  # two forms, eight structures
+    order = ["exact", "exact-feedback", "approximate", "refused"]
+    places = [order.index(a.verdict) for a in ranking]
+    assert places == sorted(places)
+    assert {a.verdict for a in ranking} == {"exact", "exact-feedback", "refused"}
+    for attempt in ranking:  # each as if it had been asked for
+        try:
+            asked = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": "1", **attempt.changed})
+        except ConversionRefusedError:
+            assert attempt.verdict == "refused"
+        else:
+            assert asked.verdict == attempt.verdict
+
+
+def test_the_scan_rules_of_the_target_are_chosen_like_the_source_s() -> None:
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=60, Td=10, Tf=1)
+    conversion = pidemu.convert(source, "mathworks/pid2")
+    assert dict(conversion.chosen) == {"IFormula": "BackwardEuler", "DFormula": "BackwardEuler"}
+    assert conversion.verdict == "exact"
+    forced = pidemu.convert(source, "mathworks/pid2", options={"IFormula": "Trapezoidal", "DFormula": "Trapezoidal"})
+    assert forced.certificate.feedback.is_exact
+    assert forced.verdict == "approximate"
+    assert "the two equations are the same" in forced.sentence.lower()
 
 
 def test_negative_gains_become_positive_ones_with_the_other_action() -> None:

@@ -95,6 +95,7 @@ NO_GAIN = [
         {"kp": 0, "ki": 0.1, "kd": 3},
         "emerson/deltav",
         "no proportional action",
+        {"FORM": "Standard", "STRUCTURE": "1"},
     ),
 ]
 
@@ -128,6 +129,7 @@ RANGE = [
         {"K": 1, "T1": 1, "T2": 30},
         "emerson/deltav",
         "RATE would have to be negative",
+        {"FORM": "Standard"},
     ),
 ]
 """A range of a dial left; in the last one a closed form asks for a negative derivative."""

@@ -22,7 +22,7 @@ CORE = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 
 
 def to_itself(s: Settings, **given_: object) -> Conversion:
-    return pidemu.convert(s, s.card, options=s.options, given=given_)
+    return pidemu.convert(s, s.card, options=s.options, given=given_, emulate=False)
 
 
 @pytest.mark.parametrize("card", ALL)
@@ -78,11 +78,11 @@ def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: st
     a = s.algorithm()
     assume(a.sp_filter is a.pv_filter is a.e_filter is None)  # the way back holds these, and the parallel form has none
     try:
-        there = pidemu.convert(s, "generic/parallel")
+        there = pidemu.convert(s, "generic/parallel", emulate=False)
     except ConversionRefusedError:
         assume(False)
     assume(there.certificate.feedback.is_exact)
-    back = pidemu.convert(there.settings, s.card, options=s.options, given=uncomputed(s))
+    back = pidemu.convert(there.settings, s.card, options=s.options, given=uncomputed(s), emulate=False)
     assert back.certificate.feedback.is_exact
     assert back.verdict in ("exact", "exact-feedback")
     if there.verdict == "exact" and has_distinct_times(s) and s.equation.proportional.on != "none":
@@ -107,13 +107,15 @@ def deviation(s: Settings, t: Settings, low: float, high: float) -> float:
 def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObject, names: tuple[str, str]) -> None:
     a = settings_that_act(data, pidemu.load_card(names[0]))
     try:
-        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])))
-        back = pidemu.convert(there.settings, a.card, options=a.options, given=uncomputed(a))
+        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])), emulate=False)
+        back = pidemu.convert(there.settings, a.card, options=a.options, given=uncomputed(a), emulate=False)
     except ConversionRefusedError:
         assume(False)
     bands = [c.certificate.feedback.loop_band for c in (there, back)]
     low, high = max(b.low for b in bands), min(b.high for b in bands)
-    assert high / low > 100, "both bands are placed by the same effective integral time"
+    if a.algorithm().ki:
+        assert high / low > 100, "both bands are placed by the same effective integral time"
+    assume(high > low)  # without integral action, by a ratio of moments that a conversion need not keep
     bound = math.prod(1 + b.max_deviation for b in bands) - 1
     # the bands' 300 frequencies do not meet the worst one exactly: 2 % of the deviation
     assert deviation(a, back.settings, low, high) <= 1.02 * bound + 1e-9

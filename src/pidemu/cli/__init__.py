@@ -17,6 +17,7 @@ _COMMANDS: Final = {
     "convert": "Convert settings to another card, with a certificate.",
     "run": "Run a card on recorded signals.",
     "compare": "Run cards on the same signals and compare their outputs.",
+    "matrix": "Convert typical settings of every card to every card.",
     "code": "Print the scan program of a card with its settings.",
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -263,10 +264,11 @@ def convert(
     work, settings, how, refusal = best.solver, best.settings, best.match, ""
     if settings is None or work is None:
         first = min(ranking, key=lambda a: len(a.changed))
-        if first.solver is None or first.error is None:
+        if first.solver is None or first.error is None or isinstance(first.error, ScanError):
             raise first.error or ConversionRefusedError(f"{card.id} has no options left to try")
         work = first.solver
         settings, refusal = work.refused(first.error)
+        refusal += _other_options(attempts(card, {}, solver, aim, every=False)[0], taken) if options else ""
         if settings is None:
             raise ConversionRefusedError(refusal)
         best, how = first, "constrained"
@@ -286,6 +288,18 @@ def convert(
     return conversion
 
 
+def _other_options(attempt: Attempt, taken: Mapping[str, object]) -> str:
+    """Return which options, instead of those that the user chose, would do; empty where none would."""
+    if attempt.settings is None:
+        return ""
+    chosen = attempt.settings.options
+    words = {
+        n: chosen[n] for n in chosen if n in attempt.changed or (n in taken and str(taken[n]).casefold() != chosen[n].casefold())
+    }
+    text = " ".join(f'--set "{n}={c}"' if " " in c else f"--set {n}={c}" for n, c in words.items())
+    return f"; other options would do: {text}: {attempt.verdict}"
+
+
 def _refuse_recursions(source: Settings, target: Card) -> None:
     for card in (source.card, target):
         if card.data.form is Form.DAHLIN:
@@ -303,8 +317,8 @@ def _scans(scan: float | tuple[float, float] | None) -> tuple[float, float] | No
         pair = (float(scan), float(scan)) if isinstance(scan, Real) else tuple(float(h) for h in scan)  # type: ignore[union-attr]
     except (TypeError, ValueError):
         pair = ()
-    if len(pair) != 2:
-        raise ScanError(f"scan is {scan!r}; it is an interval in seconds, or two: (1.0, 0.5)")
+    if len(pair) != 2 or not all(math.isfinite(h) and h > 0 for h in pair):
+        raise ScanError(f"scan is {scan!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
     return pair[0], pair[1]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.canonical import default_scan
-from pidemu.conversion.certificate import ScanByScan
+from pidemu.conversion.certificate import EXACT, ScanByScan
 from pidemu.conversion.linear import time_scale
 from pidemu.errors import ScanError
 from pidemu.record.files import Record
@@ -28,8 +28,8 @@ _LINEAR_UNTIL: Final = "large positive error"
 """The first part of the standard record that is meant to reach a limit."""
 _FINEST: Final = 2000
 """Scans per characteristic time: more would take long and show nothing new."""
-_COARSEST: Final = 20
-"""Fewer would leave nothing to see."""
+_ENOUGH, _COARSEST = 200, 20
+"""The same where the interval is ours to take: as many as show what there is, and fewer would leave nothing to see."""
 _HAIR: Final = 1e-6
 _TRIES: Final = 6
 
@@ -37,8 +37,8 @@ _TRIES: Final = 6
 def common_interval(source: Settings, target: Settings) -> float:
     """Return a scan interval for both controllers where nobody gave any [s].
 
-    It is the source card's, made short enough for the settings: at most a twentieth of the effective integral time, and short
-    enough for the filters of both.
+    It is the source card's, made to suit the settings: between a 200th and a 20th of the effective integral time, and short enough
+    for the filters of both.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def common_interval(source: Settings, target: Settings) -> float:
         No interval suits both.
     """
     time = time_scale(source.law())
-    h = min(max(default_scan(source.equation), time / _FINEST), time / _COARSEST)
+    h = min(max(default_scan(source.equation), time / _ENOUGH), time / _COARSEST)
     for _ in range(_TRIES):
         with suppress(ScanError):
             source.law(h), target.law(h)
@@ -99,13 +99,13 @@ def emulated(
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
-    sides: list[tuple[Floats, Floats]] = []
-    for still in (False, True):
-        mine, theirs = (replace(r, sp=np.full_like(r.sp, REST)) if still else r for r in (record, other))
-        u = REST + abs(factor) * (_outputs(source, mine, scans[0], "reverse") - REST)
-        v = _outputs(target, theirs, scans[1], "reverse" if factor > 0 else "direct")
-        sides.append((u, v[at]))
-    apart, on_measurement = (np.nan_to_num(np.abs(v - u), nan=np.inf) for u, v in sides)
+    mine, theirs = _Bench(source, scans[0], "reverse"), _Bench(target, scans[1], "reverse" if factor > 0 else "direct")
+    ours = REST + abs(factor) * (mine.outputs(record) - REST)
+    apart = _apart(ours, theirs.outputs(other)[at])
+    exact = bool(np.max(apart) <= EXACT * 100)  # then they agree on the measurement alone as well
+    still = (
+        apart if exact else _apart(REST + abs(factor) * (mine.outputs(_still(record)) - REST), theirs.outputs(_still(other))[at])
+    )
     worst = int(np.argmax(apart))
     when = float(mine_at[worst])
     return ScanByScan(
@@ -114,8 +114,8 @@ def emulated(
         largest=float(apart[worst]),
         largest_at=when,
         segment=_segment_at(record.segments, when + _HAIR * scans[0]),
-        on_measurement=float(np.max(on_measurement)),
-        size=float(np.max(np.abs(sides[0][0] - REST))),
+        on_measurement=float(np.max(still)),
+        size=float(np.max(np.abs(ours - REST))),
     )
 
 
@@ -127,10 +127,30 @@ def _segment_at(segments: tuple[Segment, ...], when: float) -> str:
     return next((s.name for s in segments if s.start <= when < s.end), segments[-1].name)
 
 
-def _outputs(settings: Settings, record: Record, h: float, action: Action) -> Floats:
-    """Return the outputs of a controller that was at rest before [%]."""
-    scale = Scale(settings)
-    controller, _ = controller_for(settings, Timing(h), action, WIDE, REST)
-    own = scale.own(record)
-    controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(REST))
-    return scale.output_percent(controller.run(own.sp, own.pv))
+def _still(record: StandardRecord) -> StandardRecord:
+    return replace(record, sp=np.full_like(record.sp, REST))
+
+
+def _apart(ours: Floats, theirs: Floats) -> Floats:
+    apart: Floats = np.nan_to_num(np.abs(theirs - ours), nan=np.inf)
+    return apart
+
+
+class _Bench:
+    """A controller that begins every record at rest."""
+
+    def __init__(self, settings: Settings, h: float, action: Action) -> None:
+        self._scale = Scale(settings)
+        self._controller, _ = controller_for(settings, Timing(h), action, WIDE, REST)
+        self._rest: dict[str, float] | None = None
+
+    def outputs(self, record: Record) -> Floats:
+        """Return the outputs on a record [%]."""
+        own = self._scale.own(record)
+        if self._rest is None:
+            self._controller.rest(float(own.sp[0]), float(own.pv[0]), self._scale.output_own(REST))
+            self._rest = self._controller.state
+        else:  # every record begins at the same rest
+            self._controller.reset()
+            self._controller.start(**self._rest)
+        return self._scale.output_percent(self._controller.run(own.sp, own.pv))

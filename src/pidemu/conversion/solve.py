@@ -80,8 +80,6 @@ class Solver:
         gain = source.by_role(Role.GAIN)
         if gain is not None and not algorithm.kp:
             target.idle_gain = gain.canonical or 1.0
-        if scans is not None:
-            target.template().law(scans[1])  # refuses an interval that is none
 
     def settings(self, aim: Aim) -> tuple[Settings, Match]:
         """Return the target's settings and how they were found.

@@ -341,7 +341,7 @@ class Target:
         parallel = self.form is Form.PARALLEL
         scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
         time = n.kd / scale if parallel else n.kd / n.K if self.has_proportional or not _is_zero(n.K) else 0.0
-        base = time / (1 + time * n.ki / n.K) if f.effective else time
+        base = time / (1 + time * n.ki / n.K) if f.effective and not _is_zero(time) else time
         Tf = n.Tf if n.Tf is not None else f.time if f.kind == "time" else f.ratio * base
         if f.kind != "time" and isinstance(base, float) and base == 0:
             Tf = 0.0
