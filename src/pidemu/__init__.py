@@ -19,15 +19,18 @@ if TYPE_CHECKING:
         CardError,
         ConversionRefusedError,
         PidemuError,
+        ProcessError,
         RecordError,
         ScanError,
         SettingError,
         UnitError,
     )
     from pidemu.law import Law
+    from pidemu.process import Process
     from pidemu.record.files import Record, read_record
     from pidemu.settings import Settings
     from pidemu.signals import Event
+    from pidemu.simulation import Simulation, simulate
 
 __version__ = "0.1.0"
 
@@ -45,15 +48,19 @@ _HOMES = {
     "CardError": "errors",
     "ConversionRefusedError": "errors",
     "PidemuError": "errors",
+    "ProcessError": "errors",
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",
     "UnitError": "errors",
     "Event": "signals",
     "Law": "law",
+    "Process": "process",
     "Record": "record.files",
     "read_record": "record.files",
     "Settings": "settings",
+    "Simulation": "simulation",
+    "simulate": "simulation",
 }
 
 __all__ = [
@@ -66,12 +73,15 @@ __all__ = [
     "Event",
     "Law",
     "PidemuError",
+    "Process",
+    "ProcessError",
     "Reading",
     "Record",
     "RecordError",
     "ScanError",
     "SettingError",
     "Settings",
+    "Simulation",
     "UnitError",
     "__version__",
     "cards",
@@ -80,6 +90,7 @@ __all__ = [
     "load_card",
     "read_record",
     "readings",
+    "simulate",
 ]
 
 

@@ -10,6 +10,7 @@
     │   └── UndefinedError   a combination of options that makes no controller
     ├── ScanError            an algorithm cannot be run at this scan interval or with these limits
     ├── RecordError          a recorded signal file cannot be used
+    ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
 """
 
@@ -110,6 +111,10 @@ class ScanError(PidemuError):
 
 class RecordError(PidemuError):
     """A file of recorded signals cannot be used."""
+
+
+class ProcessError(PidemuError):
+    """A process model cannot be one, or a controller cannot close a loop with it."""
 
 
 class ConversionRefusedError(PidemuError):
