@@ -30,7 +30,6 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     yield from _setpoint(c)
     yield from _multiplier(c)
     yield from _noise(c)
-    yield from _without_integral(c.source, c.settings)
     yield from (difference.text for difference in c.certificate.nonlinear)
     if c.certificate.not_emulated:
         yield f"the two were not run against each other: {c.certificate.not_emulated}"
@@ -114,19 +113,6 @@ def _noise(c: Conversion) -> Iterator[str]:
         yield f"measurement noise: at {high:.3g} rad/s the target's gain is {ratio:.3g} times the source's"
     elif 0 < ratio < 1 / _NOISE:
         yield f"measurement noise: at {high:.3g} rad/s the target's gain is only {ratio:.3g} times the source's"
-
-
-def _without_integral(source: Settings, target: Settings) -> Iterator[str]:
-    if source.algorithm().ki or target.algorithm().ki:
-        return
-    ways = [s.equation.implementation for s in (source, target)]
-    if ways == ["positional", "positional"]:
-        yield "there is no integral: the output rests on a bias, which these settings do not hold; carry it over"
-    elif ways[0] != ways[1]:
-        yield (
-            f"there is no integral: the output of {source.card.id} ({ways[0]}) and {target.card.id} ({ways[1]}) counts from "
-            "different starts, a bias for positional, the output at the transfer for velocity"
-        )
 
 
 def _action(source: Settings, target: Settings) -> Iterator[str]:

@@ -29,16 +29,15 @@ def full_certificate(work: Solver, settings: Settings, *, emulate: bool) -> Cert
     if not emulate:
         return certificate
     source = work.source
+    if work.process is not None:
+        from pidemu.simulation import compare_loops
+
+        certificate = replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))
     try:
         scans = work.scans or (common_interval(source, settings),) * 2
         both = emulated(source, settings, scans, work.factor, taken=work.scans is None)
     except ScanError as error:
         return replace(certificate, not_emulated=str(error))
-    certificate = replace(
+    return replace(
         certificate, scan_by_scan=both, nonlinear=nonlinear_differences(source, settings, scans, scale_of(source, scans[0]))
     )
-    if work.process is None:
-        return certificate
-    from pidemu.simulation import compare_loops
-
-    return replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))

@@ -73,7 +73,7 @@ def meet(problem: Problem) -> Sequence[float]:
         There are none: the intervals are too long for the settings.
     """
     wanted = problem.wanted.held_expansion(3)
-    size = _sizes(wanted)
+    size = sizes(wanted)
     asked = list(wanted)
     for _ in range(_ROUNDS):
         missing = [w - x for w, x in zip(wanted, problem.law(asked).held_expansion(3), strict=True)]
@@ -85,8 +85,8 @@ def meet(problem: Problem) -> Sequence[float]:
     raise NoMatchError("the scan intervals are too long for these settings")
 
 
-def _sizes(moments: Sequence[float]) -> tuple[float, float, float]:
-    """Return what the three moments are measured by: themselves, or what the others make of them over one time."""
+def sizes(moments: Sequence[float]) -> tuple[float, float, float]:
+    """Return what each of three moments is measured by: itself, or what the others make of it over one time."""
     m0, m1, m2 = moments
     time = abs(m1 / m0) if m0 and m1 else abs(m2 / m1) if m1 and m2 else 1.0
     return abs(m0) or abs(m1) / time or abs(m2) / time**2, abs(m1) or abs(m0) * time, abs(m2) or abs(m1) * time or abs(m0) * time**2
@@ -116,7 +116,7 @@ def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence
         return np.array([ratio.real, ratio.imag])
 
     x = np.array(start[1:], dtype=float)
-    size = np.array(_sizes(start)[1:])
+    size = np.array(sizes(start)[1:])
     try:
         for _ in range(_ROUNDS):
             off = apart(x)
@@ -158,7 +158,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
     C = sign * problem.wanted.held(w)
     wanted = P / (1 + P * C)
     weight = 1 / np.sqrt(w)  # 1/w of the step, and dw = w dlog(w)
-    size = np.array(_sizes(start)[1:])
+    size = np.array(sizes(start)[1:])
     count = 2 if problem.target.has_derivative else 1
 
     def apart(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -16,7 +16,7 @@ from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.certificate import EXACT, Certificate, ScanCost
 from pidemu.conversion.linear import bands, certify, deviation, scan_phase
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
+from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet, sizes
 from pidemu.conversion.nearest import nearest
 from pidemu.conversion.scanwise import common_interval
 from pidemu.conversion.target import Numbers, Target, TargetFilter
@@ -212,22 +212,23 @@ class Solver:
             There is none, or it leaves the target's ranges.
         """
         settings, how = self._closed(match)
-        if self.compensates and self.certify(settings).verdict != "exact" and how in ("exact", "low-frequency"):
-            settings, how = self._at_scans(settings, how, match)
+        if self.compensates and self.certify(settings).verdict != "exact":
+            settings, how = self._at_scans(settings, match)
         if how != "low-frequency" or match is not None:
             return settings, how
         return self._not_behind_the_textbook(settings)
 
-    def _at_scans(self, settings: Settings, how: Match, match: Match | None) -> tuple[Settings, Match]:
+    def _at_scans(self, settings: Settings, match: Match | None) -> tuple[Settings, Match]:
         """Return settings whose sampled, held law has the source's moments; where these are not nearer, the given ones."""
         with suppress(NoMatchError, SettingError, ScanError):
             bent = self._through(self._met, settings)
             if self.deviation(bent) < self.deviation(settings) * (1 - _CLEARLY):
-                same = self.certify(bent).headline.is_exact
-                return bent, "exact" if same else "low-frequency"
-        if how == "exact" and match == "exact" and not self.certify(settings).headline.is_exact:
+                settings = bent
+        if self.certify(settings).headline.is_exact:
+            return settings, "exact"
+        if match == "exact":
             raise NoMatchError("no settings give the same law at these scan intervals and rules")
-        return settings, how
+        return settings, "low-frequency"
 
     def _met(self, problem: Problem, _start: Sequence[float]) -> Sequence[float]:
         """Return moments that `meet` the source's, with a free filter set so that the next moment agrees too, as far as it can."""
@@ -323,7 +324,14 @@ class Solver:
             with suppress(NoMatchError, SettingError):
                 return self._best(self._matched(self.scaled.moments(), self.target.filter))
         self.target.filter = delivered
-        return self._best(self._matched(self.scaled.moments(), delivered))
+        found = self._best(self._matched(self.scaled.moments(), delivered))
+        if self._has_the_moments(found):
+            return found
+        return self._through(lambda problem, _: meet(problem), found, sampled=False)  # a filter that no closed form knows
+
+    def _has_the_moments(self, settings: Settings) -> bool:
+        wanted, found = self.scaled.moments(), settings.law().moments()
+        return all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True))
 
     def _matched(self, moments: Sequence[float], filt: TargetFilter) -> Iterable[Numbers]:
         """Return the solutions of the low-frequency match, with a filter that was free set to the value it was fixed at."""
@@ -331,7 +339,7 @@ class Solver:
             chosen = filt.setting is not None and filt.setting not in self.target.given
             yield replace(numbers, Tf=self._time_of(numbers)) if chosen else numbers
 
-    def _through(self, solve: Way, start: Settings | None = None) -> Settings:
+    def _through(self, solve: Way, start: Settings | None = None, *, sampled: bool = True) -> Settings:
         """Return settings found by way of their moments, with the filter that the closed form would have.
 
         Raises
@@ -348,7 +356,7 @@ class Solver:
         def numbers(moments: Sequence[float]) -> Numbers:
             return next(iter(self._matched(moments, self.target.filter)))
 
-        scans = self.scans if self.compensates else None
+        scans = self.scans if self.compensates and sampled else None
         wanted = self.at_source_scan if scans and self.at_source_scan else self.law
         problem = Problem(Law(_scaled(wanted.algorithm, self.factor), wanted.scan), self.target, numbers, scans and scans[1])
         return self._weighted(numbers(solve(problem, self.scaled.moments())), problem)

@@ -1,0 +1,158 @@
+"""What holds for every ordered pair of cards, whatever the settings."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import pidemu
+from pidemu.conversion.convert import Conversion
+from pidemu.conversion.linear import bands
+from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.settings import Settings, limits
+from tests.conversion.support import difference, needed, outputs, random_signal, settings_that_act
+from tests.conversion.test_options import CARDS, SOURCES
+from tests.helpers import linear
+
+PAIRS = list(itertools.product(CARDS, CARDS))
+SCANS = st.none() | st.floats(0.2, 3).map(lambda h: (h, h)) | st.tuples(st.floats(0.1, 2), st.floats(0.1, 2))
+SAME = 1e-9
+"""Of the span, or of what the outputs move over: sums over 200 scans of doubles."""
+
+
+def convert(source: Settings, target: str, **arguments: object) -> Conversion:
+    """Convert, or raise the refusal with what it must hold checked."""
+    held = {} if source.card.id == target else needed(pidemu.load_card(target))
+    try:
+        return pidemu.convert(source, target, given=held, **arguments)  # type: ignore[arg-type]
+    except ConversionRefusedError as refusal:
+        assert len(str(refusal)) > 20, "a refusal has a reason"
+        assert target in str(refusal)
+        if refusal.nearest is not None:
+            assert_in_range(refusal.nearest.settings)
+            assert refusal.nearest.certificate.feedback.loop_band.max_deviation < 1  # nearer than no controller at all
+        raise
+
+
+def assert_in_range(found: Settings) -> None:
+    for name, value in found.items():
+        low, high = limits(value.setting)
+        assert value.off or low <= value.value <= high, f"{name} = {value.value}"
+
+
+def drawn(data: st.DataObject) -> tuple[Settings, str]:
+    source, target = data.draw(st.sampled_from(PAIRS))
+    return settings_that_act(data, pidemu.load_card(source)), target
+
+
+@given(data=st.data(), scan=SCANS)
+@settings(max_examples=300)
+def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
+    data: st.DataObject, scan: tuple[float, float] | None
+) -> None:
+    source, target = drawn(data)
+    try:
+        conversion = convert(source, target, scan=scan)
+    except (ConversionRefusedError, ScanError):
+        return
+    assert_in_range(conversion.settings)
+    assert conversion.sentence.endswith(".")
+    verdict, certificate = conversion.verdict, conversion.certificate
+    assert verdict in ("exact", "exact-feedback", "approximate")
+    if verdict == "approximate" or certificate.scan_by_scan is None or conversion.factor < 0:
+        return
+    h = certificate.scan_by_scan.scan
+    assert h[0] == h[1] or not certificate.feedback.is_exact
+    sp, pv = random_signal(11, 120), random_signal(12, 120)
+    if verdict == "exact-feedback":
+        sp = np.full(120, 50.0)
+    a, b = (outputs(s, sp, pv, h[0]) for s in (conversion.source, conversion.settings))
+    if not source.algorithm().ki:  # positional: counted from the bias; velocity: from the output at the transfer
+        a, b = a - a[0], b - b[0]
+    # the laws agree per frequency to 1e-9, an output adds up 120 scans of it
+    assert difference(a, b) < 100 * SAME
+
+
+@given(data=st.data(), scan=SCANS)
+@settings(max_examples=250)
+def test_no_conversion_is_farther_off_in_the_loop_band_than_the_textbook_rule(
+    data: st.DataObject, scan: tuple[float, float] | None
+) -> None:
+    source, target = drawn(data)
+    try:
+        conversion = convert(source, target, scan=scan, emulate=False)
+    except (ConversionRefusedError, ScanError):
+        assume(False)
+    book = conversion.textbook.certificate
+    assume(book is not None)
+    assert book is not None
+    own, other = (c.headline.loop_band.max_deviation for c in (conversion.certificate, book))
+    assert own <= other * (1 + 1e-5) + 1e-9  # the largest value is found on a grid, to about that
+
+
+PER_PERIOD = 48
+PERIODS = 40
+
+
+def shown(s: Settings, w: float, h: float) -> complex:
+    """Feedback response of a running controller at a frequency whose period is a whole number of scans."""
+    n = np.arange(PERIODS * PER_PERIOD)
+    phase = w * h * n
+    u = outputs(s, np.full(n.size, 50.0), np.asarray(50 + np.sin(phase)), h)
+    last = slice(-4 * PER_PERIOD, None)
+    basis = np.column_stack([np.sin(phase[last]), np.cos(phase[last]), np.ones(4 * PER_PERIOD), n[last]])
+    sine, cosine, *_ = np.linalg.lstsq(basis, u[last], rcond=None)[0]
+    return -complex(sine, cosine)
+
+
+@given(data=st.data(), place=st.floats(0, 1))
+@settings(max_examples=120)
+def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_the_band(
+    data: st.DataObject, place: float
+) -> None:
+    source, target = drawn(data)
+    a = source.algorithm()
+    assume(linear(a) == a)
+    band = bands(source.law(), None)[0]
+    w = band[0] ** (1 - place) * band[1] ** place
+    h = 2 * math.pi / (w * PER_PERIOD)
+    assume(max(a.Tf, *(lag.at(h) for lag in (a.pv_filter, a.e_filter) if lag is not None), 0.0) < 2 * PER_PERIOD * h)
+    try:
+        conversion = convert(source, target, scan=h, emulate=False)
+        found = conversion.settings.algorithm()
+        assume(linear(found) == found and found.Tf < 2 * PER_PERIOD * h)
+        ratio = shown(conversion.settings, w, h) / (conversion.factor * shown(source, w, h))
+    except (ConversionRefusedError, ScanError):
+        assume(False)
+    if conversion.factor < 0:
+        ratio = -ratio
+    stated = conversion.certificate.feedback_at_scan
+    assert stated is not None
+    deviation = abs(ratio - 1)
+    assert deviation <= stated.loop_band.max_deviation * 1.01 + 1e-6  # 1e-6: what is left of the transients
+    # at the frequency itself, the law that the certificate is made of is what is shown, to 1 %
+    law = complex(conversion.settings.law(h).held(w)[()] / (abs(conversion.factor) * source.law(h).held(w)[()]))
+    assert deviation == pytest.approx(abs(math.copysign(1, conversion.factor) * law - 1), rel=0.01, abs=1e-6)
+
+
+@pytest.mark.parametrize("source", CARDS)
+def test_p_on_the_measurement_and_p_on_the_error_are_never_called_equal_for_setpoints(source: str) -> None:
+    settings = dict(SOURCES)[source]
+    if not settings.algorithm().kp:
+        pytest.fail("a usual setting has proportional action")
+    for target in ("yokogawa/fieldbus-pid", "generic/standard"):
+        fixed = {"b": 1.0, "c": 0.0} if target == "generic/standard" else {}
+        try:
+            conversion = pidemu.convert(settings, target, given=fixed, emulate=False)
+        except ConversionRefusedError:
+            continue
+        on_pv = [not s.algorithm().b for s in (conversion.source, conversion.settings)]
+        if on_pv[0] != on_pv[1]:
+            assert conversion.verdict in ("exact-feedback", "approximate")
+            assert not conversion.certificate.setpoint.is_exact
+            assert any("proportional action is on the measurement in one" in w for w in conversion.warnings)
