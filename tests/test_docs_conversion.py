@@ -13,7 +13,7 @@ import pytest
 
 import pidemu
 from pidemu.card.load import Card
-from pidemu.conversion.linear import bands, deviation
+from pidemu.certificate.linear import bands, deviation
 from pidemu.settings import Settings
 
 ROOT = Path(__file__).parents[1]

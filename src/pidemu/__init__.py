@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pidemu.ambiguity.readings import Reading, readings
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import Conversion, convert
-    from pidemu.conversion.readings import Reading, readings
     from pidemu.emulator import Controller
     from pidemu.errors import (
         CardError,
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
         UnitError,
     )
     from pidemu.law import Law
-    from pidemu.process import Process
+    from pidemu.loop.process import Process
+    from pidemu.loop.simulation import Simulation, simulate
     from pidemu.record.files import Record, read_record
     from pidemu.settings import Settings
     from pidemu.signals import Event
-    from pidemu.simulation import Simulation, simulate
 
 __version__ = "0.1.0"
 
@@ -42,8 +42,8 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.convert",
     "convert": "conversion.convert",
-    "Reading": "conversion.readings",
-    "readings": "conversion.readings",
+    "Reading": "ambiguity.readings",
+    "readings": "ambiguity.readings",
     "Controller": "emulator",
     "CardError": "errors",
     "ConversionRefusedError": "errors",
@@ -55,12 +55,12 @@ _HOMES = {
     "UnitError": "errors",
     "Event": "signals",
     "Law": "law",
-    "Process": "process",
+    "Process": "loop.process",
     "Record": "record.files",
     "read_record": "record.files",
     "Settings": "settings",
-    "Simulation": "simulation",
-    "simulate": "simulation",
+    "Simulation": "loop.simulation",
+    "simulate": "loop.simulation",
 }
 
 __all__ = [

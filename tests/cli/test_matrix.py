@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import pidemu
-from pidemu.conversion import cell as cell_module
+from pidemu.matrix import cell as cell_module
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, strict_json, told
 

@@ -11,8 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.certificate.linear import bands
 from pidemu.conversion.convert import Conversion
-from pidemu.conversion.linear import bands
 from pidemu.errors import ConversionRefusedError, ScanError
 from pidemu.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, settings_that_act
@@ -112,9 +112,7 @@ def shown(s: Settings, w: float, h: float) -> complex:
 
 @given(data=st.data(), place=st.floats(0, 1))
 @settings(max_examples=120)
-def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_the_band(
-    data: st.DataObject, place: float
-) -> None:
+def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_the_band(data: st.DataObject, place: float) -> None:
     source, target = drawn(data)
     a = source.algorithm()
     assume(linear(a) == a)

@@ -21,10 +21,10 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.card.library import ENVIRONMENT
-from pidemu.conversion.certificate import Band
+from pidemu.certificate.models import Band
 from pidemu.conversion.convert import Conversion, convert
 from pidemu.errors import PidemuError
-from pidemu.process import Process, parse_process
+from pidemu.loop.process import Process, parse_process
 from pidemu.report.certificate import certificate_page, write_page
 from pidemu.report.command import command_for, process_words
 from pidemu.report.curves import bode, closed_loops, responses

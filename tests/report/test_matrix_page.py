@@ -12,9 +12,9 @@ from urllib.parse import unquote
 import pytest
 
 import pidemu
-from pidemu.conversion.cell import OUTCOMES, Cell, Work, cell
-from pidemu.conversion.matrix import Matrix, matrix
 from pidemu.errors import PidemuError
+from pidemu.matrix.cell import OUTCOMES, Cell, Work, cell
+from pidemu.matrix.matrix import Matrix, matrix
 from pidemu.report.matrix_page import DOCS, page, shade, summary, write_page
 from tests.checks.bench import VALID, edited, written
 

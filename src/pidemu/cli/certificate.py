@@ -5,17 +5,17 @@ from __future__ import annotations
 import click
 
 from pidemu.card.load import Card
+from pidemu.certificate.figures import BAND_COLUMNS, band_rows, emulation_line, kick_line, loop_rows, rounding_line, textbook_line
+from pidemu.certificate.figures import decibels as _db
+from pidemu.certificate.figures import degrees as _deg
+from pidemu.certificate.figures import other_units as _other_units
+from pidemu.certificate.figures import percent as _percent
+from pidemu.certificate.figures import unit_of as _unit
+from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
-from pidemu.conversion.certificate import Certificate, LoopComparison
 from pidemu.conversion.choices import Attempt
 from pidemu.conversion.convert import Conversion
-from pidemu.conversion.cutover import TransferPlan
-from pidemu.conversion.figures import BAND_COLUMNS, band_rows, emulation_line, kick_line, loop_rows, rounding_line, textbook_line
-from pidemu.conversion.figures import decibels as _db
-from pidemu.conversion.figures import degrees as _deg
-from pidemu.conversion.figures import other_units as _other_units
-from pidemu.conversion.figures import percent as _percent
-from pidemu.conversion.figures import unit_of as _unit
+from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pidemu.card.load import Card
-from pidemu.conversion.figures import number as number  # noqa: PLC0414  # the commands take it from here
+from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.errors import SettingError
 
 if TYPE_CHECKING:

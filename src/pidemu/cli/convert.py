@@ -113,12 +113,12 @@ def command(
         "pv_range": to_pv_range, "op_range": to_op_range, "allow_approximate": allow_approximate, "all_options": all_options,
     }  # fmt: skip
     if process is not None:
-        from pidemu.process import parse_process
+        from pidemu.loop.process import parse_process
 
         arguments["process"] = parse_process(process)
     if word is not None:
+        from pidemu.ambiguity.readings import readings
         from pidemu.cli.readings import refuse_to_choose
-        from pidemu.conversion.readings import readings
 
         found = readings(word, {**given, **ranges}, vendors=vendors)
         if len(found) > 1:

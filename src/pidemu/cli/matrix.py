@@ -12,9 +12,9 @@ from typing import Final
 import click
 
 from pidemu.cli.common import heading, json_option, print_json, table, vendors_option, wrapped
-from pidemu.conversion.cell import OUTCOMES, Cell
-from pidemu.conversion.matrix import Matrix, counts, matrix
 from pidemu.errors import PidemuError
+from pidemu.matrix.cell import OUTCOMES, Cell
+from pidemu.matrix.matrix import Matrix, counts, matrix
 
 _PIPED: Final = 110
 """Columns of text that go into a pipe."""

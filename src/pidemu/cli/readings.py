@@ -8,10 +8,10 @@ from typing import Any, Final, NoReturn
 
 import click
 
+from pidemu.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.card.load import Card
 from pidemu.cli.common import number, print_json
 from pidemu.conversion.convert import Conversion, convert
-from pidemu.conversion.readings import Apart, Reading, apart, command_line
 from pidemu.errors import ConversionRefusedError
 from pidemu.plain import json_safe
 from pidemu.settings import Settings

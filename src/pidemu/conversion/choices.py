@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from pidemu.card.load import Card
 from pidemu.card.models import Equation
+from pidemu.certificate.models import Certificate, Verdict
 from pidemu.conversion.aim import Aim, Match
-from pidemu.conversion.certificate import Certificate, Verdict
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.solve import RANK, Solver
 from pidemu.conversion.target import is_computed

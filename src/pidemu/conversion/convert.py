@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
+from pidemu.certificate.models import Certificate, Rounded, Verdict
+from pidemu.certificate.sentence import sentence
+from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Match, read_aim
-from pidemu.conversion.certificate import Certificate, Rounded, Verdict
 from pidemu.conversion.choices import Attempt, attempts
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.prefilter import SetpointFilter, setpoint_filter
-from pidemu.conversion.sentence import sentence
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
@@ -28,8 +28,8 @@ from pidemu.settings import Settings, Value, limits
 from pidemu.units import Role, is_reciprocal, parse_unit
 
 if TYPE_CHECKING:
-    from pidemu.conversion.cutover import TransferPlan
-    from pidemu.process import Process
+    from pidemu.cutover.plan import TransferPlan
+    from pidemu.loop.process import Process
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Conversion:
         sp, pv, op : float
             Setpoint, measurement and output at the cut-over [engineering units where the ranges are given, else %].
         """
-        from pidemu.conversion.cutover import transfer_plan
+        from pidemu.cutover.plan import transfer_plan
 
         return transfer_plan(self.settings, sp, pv, op, scan=self.scan[1] if self.scan else None)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pidemu.conversion.certificate import Certificate
-from pidemu.conversion.nonlinear import nonlinear_differences
-from pidemu.conversion.scanwise import common_interval, emulated
+from pidemu.certificate.models import Certificate
+from pidemu.certificate.nonlinear import nonlinear_differences
+from pidemu.certificate.scanwise import common_interval, emulated
 from pidemu.conversion.solve import Solver
 from pidemu.errors import ScanError
 from pidemu.record.standard import scale_of
@@ -30,7 +30,7 @@ def full_certificate(work: Solver, settings: Settings, *, emulate: bool) -> Cert
         return certificate
     source = work.source
     if work.process is not None:
-        from pidemu.simulation import compare_loops
+        from pidemu.loop.simulation import compare_loops
 
         certificate = replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))
     try:

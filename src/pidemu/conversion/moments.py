@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.conversion.linear import bands
+from pidemu.certificate.linear import bands
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.target import Numbers, Target
 from pidemu.law import Law
 
 if TYPE_CHECKING:
-    from pidemu.process import Process
+    from pidemu.loop.process import Process
 
 _ROUNDS = 60
 _CONVERGED = 1e-13

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.card.base import Form
-from pidemu.conversion.linear import bands
+from pidemu.certificate.linear import bands
 from pidemu.conversion.target import Numbers, Target
 from pidemu.law import Law, at_frequencies, paths
 from pidemu.settings import limits

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.base import Form
+from pidemu.certificate.linear import bands, certify, deviation, scan_phase
+from pidemu.certificate.models import EXACT, Certificate, ScanCost
+from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion import match as closed
 from pidemu.conversion.aim import Aim, Match
-from pidemu.conversion.certificate import EXACT, Certificate, ScanCost
-from pidemu.conversion.linear import bands, certify, deviation, scan_phase
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet, sizes
 from pidemu.conversion.nearest import nearest
-from pidemu.conversion.scanwise import common_interval
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import ScanError, SettingError
 from pidemu.law import Law
@@ -26,7 +26,7 @@ from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
 if TYPE_CHECKING:
-    from pidemu.process import Process
+    from pidemu.loop.process import Process
 
 RANK = {"exact": 0, "exact-feedback": 1, "approximate": 2, "refused": 3}
 """Verdicts, the best first."""
@@ -195,7 +195,7 @@ class Solver:
             raise SettingError(
                 "the match 'frequency' needs a frequency, frequency:0.02rad/s, or the process, to take the crossover of the loop"
             )
-        from pidemu.loop import crossover
+        from pidemu.loop.figures import crossover
 
         wanted = self.at_source_scan or self.law
         found = crossover(lambda w: self.factor * wanted.held(w), self.process, None if self.scans is None else self.scans[0])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pidemu.conversion.convert import Conversion
-from pidemu.conversion.cutover import TransferPlan
+from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.report.contents import Contents
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
+from pidemu.certificate.linear import differences
 from pidemu.conversion.convert import Conversion, convert
-from pidemu.conversion.linear import differences
 from pidemu.errors import PidemuError
-from pidemu.process import Process
+from pidemu.loop.process import Process
 from pidemu.settings import Settings
 from pidemu.units import Role
 

@@ -8,10 +8,7 @@ from functools import cached_property
 from typing import Final
 
 import pidemu
-from pidemu.conversion.certificate import EXACT
-from pidemu.conversion.convert import Conversion
-from pidemu.conversion.cutover import TransferPlan
-from pidemu.conversion.figures import (
+from pidemu.certificate.figures import (
     BAND_COLUMNS,
     band_rows,
     decibels,
@@ -26,6 +23,9 @@ from pidemu.conversion.figures import (
     textbook_line,
     unit_of,
 )
+from pidemu.certificate.models import EXACT
+from pidemu.conversion.convert import Conversion
+from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.report.command import command_for, exactly
 from pidemu.report.curves import Who, bode, closed_loops, responses

@@ -9,9 +9,9 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.certificate.scanwise import WIDE
 from pidemu.comparison.side_by_side import run_on
 from pidemu.conversion.convert import Conversion
-from pidemu.conversion.scanwise import WIDE
 from pidemu.errors import PidemuError
 from pidemu.law import Law
 from pidemu.rational import Response
@@ -218,7 +218,7 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
     """Return what both controllers do in a closed loop with the process, after a setpoint step and then a load step.
 
     They run at the scan intervals of the conversion; where none were given both at the shorter of those that
-    `pidemu.simulation.scan_for` finds. In both loops the process is as the target sees it.
+    `pidemu.loop.simulation.scan_for` finds. In both loops the process is as the target sees it.
 
     Parameters
     ----------
@@ -238,8 +238,8 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
     process = c.process
     if process is None:
         return None
-    from pidemu.loop import scan_for, settling_time
-    from pidemu.simulation import simulate
+    from pidemu.loop.figures import scan_for, settling_time
+    from pidemu.loop.simulation import simulate
 
     scale = abs(c.factor)
     seen = replace(process, gain=process.gain * scale)  # by the source: its output counts in other percent

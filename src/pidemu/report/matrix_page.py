@@ -15,10 +15,10 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from pidemu.card.library import ENVIRONMENT, load_card
-from pidemu.conversion.cell import Cell, percent
-from pidemu.conversion.matrix import Matrix, counts, matrix
-from pidemu.conversion.typical import DERIVATIVE_TIME, GAIN, INTEGRAL_TIME
 from pidemu.errors import PidemuError
+from pidemu.matrix.cell import Cell, percent
+from pidemu.matrix.matrix import Matrix, counts, matrix
+from pidemu.matrix.typical import DERIVATIVE_TIME, GAIN, INTEGRAL_TIME
 
 DOCS: Final = Path(__file__).resolve().parents[3] / "docs"
 STEPS: Final = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)

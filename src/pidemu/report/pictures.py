@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.conversion.figures import number
+from pidemu.certificate.figures import number
 from pidemu.rational import Response
 from pidemu.report.curves import Bode, ClosedLoops, Responses, Trace, Who
 

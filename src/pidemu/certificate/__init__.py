@@ -1,0 +1,1 @@
+"""What stays the same between two controllers, what does not, and by how much."""

@@ -1,0 +1,111 @@
+"""What the precision of two controllers makes of slow integrals (specs/equations.md, section 7)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pidemu.certificate.models import NonlinearDifference
+from pidemu.certificate.sides import Side
+from pidemu.errors import PidemuError
+from pidemu.record.files import Record
+from pidemu.record.sampling import Scale
+from pidemu.record.standard import REST
+from pidemu.running import resting
+from pidemu.scan.build import build
+from pidemu.targets.python import compiled
+
+_KEPT: Final = ("I", "M", "Ir")
+"""States that an integral is kept in: the sum; with whole numbers the output's sum and the remainder."""
+_RANGE: Final = (1e-18, 50.0)
+"""Errors between which the smallest that integrates is looked for [% of span]; the first is nothing beside a signal of 50 %."""
+_STEPS: Final = 50
+"""Bisections: more than a float32 can tell apart."""
+_SCANS: Final = 6
+_FREE: Final = (-1e9, 1e9)
+_DIFFERS: Final = 0.01
+"""Relative difference of smallest errors that is worth a word."""
+
+
+def smallest_error(side: Side) -> float:
+    """Return the smallest error that still integrates with the output at 50 % [% of the measurement span].
+
+    It is found by emulation, with the setpoint above a measurement of 50 %: the controller's own program starts in the steady state
+    of that error, bumpless, with nothing of the derivative, and the integral moves within a few scans or never. Bands and limits of
+    the integral are left out. Where the state holds the integral of ``ki e`` it moves from half a unit in its last place:
+    ``ki h e``; where it holds that of ``e/Ti`` or ``e``: ``h e/Ti`` or ``h e``.
+
+    Parameters
+    ----------
+    side : Side
+        A controller with integral action.
+
+    Returns
+    -------
+    float
+        The error [%]; infinite where one of 50 % does not integrate.
+
+    Raises
+    ------
+    ScanError
+        It cannot be emulated at this interval.
+    """
+    plain = replace(resting(side.own), shape=None, integral_deadband=None, integral_limits=None)
+    scale = Scale(side.settings)
+    program = build(plain, side.scan, limits=_FREE, initial_output=scale.output_own(50.0))
+    functions = compiled(program)
+    names = [q.name for q in program.states]
+    watched = [names.index(name) for name in _KEPT if name in names] or [names.index("u")]
+    rest = scale.own(Record(sp=np.array([REST, REST + 1.0]), pv=np.array([REST, REST])))
+    at, unit = float(rest.sp[0]), float(rest.sp[1] - rest.sp[0])
+
+    def moves(error: float) -> bool:
+        state, sp = list(functions.initial), at + error * unit
+        functions.scan(state, sp, at, 1.0, math.nan)
+        before = [state[i] for i in watched]
+        for _ in range(_SCANS):
+            functions.scan(state, sp, at, 1.0, math.nan)
+        return [state[i] for i in watched] != before
+
+    with np.errstate(all="ignore"):
+        if not moves(_RANGE[1]):
+            return math.inf
+        still, moving = (math.log(e) for e in _RANGE)
+        for _ in range(_STEPS):
+            middle = (still + moving) / 2
+            still, moving = (still, middle) if moves(math.exp(middle)) else (middle, moving)
+    return math.exp(moving)
+
+
+def arithmetic_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+    """Yield how the precision of two controllers differs, and what it makes of small errors."""
+    both = (source, target)
+    precisions = [side.own.precision for side in both]
+    if precisions == ["float64", "float64"]:
+        return
+    kinds = " and ".join(f"{side.name} computes in {_KINDS[side.own.precision]}" for side in both)
+    if not all(side.integrates for side in both):
+        if precisions[0] != precisions[1]:
+            yield NonlinearDifference("arithmetic", kinds, {})
+        return
+    try:
+        least = smallest_error(source), smallest_error(target)
+    except PidemuError as error:
+        if precisions[0] != precisions[1]:
+            yield NonlinearDifference("arithmetic", f"{kinds}; the smallest error that integrates is not known: {error}", {})
+        return
+    if precisions[0] != precisions[1] or not math.isclose(*least, rel_tol=_DIFFERS):
+        words = ", ".join(f"{_least(e)} on {side.name}" for e, side in zip(least, both, strict=True))
+        text = f"{kinds}: with the output at 50 % the integral stands still where the error is smaller than {words}"
+        yield NonlinearDifference("arithmetic", text, {"smallest error that integrates [% of PV span]": least})
+
+
+_KINDS: Final = {"float64": "float64", "float32": "float32", "integer": "whole numbers"}
+
+
+def _least(error: float) -> str:
+    return f"{error:.2g} % of span" if math.isfinite(error) else "any"

@@ -1,0 +1,144 @@
+"""The figures of a conversion in print, alike on the terminal and on the page."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from pidemu.certificate.models import EXACT, Band, Certificate, LoopComparison, PathComparison
+from pidemu.units import Role
+
+if TYPE_CHECKING:
+    from pidemu.conversion.convert import Conversion
+    from pidemu.settings import Value
+
+BAND_COLUMNS: Final = ("path", "band", "rad/s", "deviation", "gain", "phase")
+"""Headings of `band_rows`."""
+_LOOP_ROWS: Final = (
+    ("gain margin", "gain_margin"),
+    ("phase margin [deg]", "phase_margin"),
+    ("delay margin [s]", "delay_margin"),
+    ("crossover [rad/s]", "crossover"),
+    ("Ms", "Ms"),
+    ("Mt", "Mt"),
+    ("IAE, load step of 1 % [% s]", "iae"),
+)
+
+
+def number(x: float) -> str:
+    """Return a number in six significant digits, as people write it."""
+    if math.isinf(x):
+        return "inf" if x > 0 else "-inf"
+    text = f"{x:.6g}"
+    return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
+
+
+def percent(deviation: float) -> str:
+    """Return a relative deviation in percent, with two digits; ``none`` for one that is only rounding."""
+    if deviation < EXACT:
+        return "none"
+    return f"{number(float(f'{100 * deviation:.2g}'))} %" if deviation < 10 else "over 1000 %"
+
+
+def decibels(band: Band) -> str:
+    """Return the largest difference of gain."""
+    return f"{band.gain_db:.2f} dB"
+
+
+def degrees(band: Band) -> str:
+    """Return the largest difference of phase."""
+    return f"{band.phase_deg:.1f} deg"
+
+
+def unit_of(v: Value) -> str:
+    """Return a dial's unit; nothing for a plain ratio."""
+    return "" if v.unit == "1" else v.unit
+
+
+def other_units(v: Value) -> str:
+    """Return an integral, derivative or gain dial in the other usual unit, so that nobody has to convert in the head."""
+    if v.off:
+        return "off"
+    if v.role is Role.INTEGRAL and "repeat" in v.unit:
+        other = "repeat/min" if v.unit == "s/repeat" else "s/repeat"
+    elif v.role is Role.INTEGRAL and v.unit in ("s", "min"):
+        other = "repeat/min"
+    elif v.role in (Role.DERIVATIVE, Role.INTEGRAL) and "min" in v.unit:
+        other = v.unit.replace("min", "s")
+    elif v.role is Role.GAIN and v.unit == "%":
+        other = "%/%"
+    else:
+        return ""
+    return f"= {number(v.to(other))} {other}"
+
+
+def band_rows(c: Certificate) -> list[list[str]]:
+    """Return how far the two are apart by path and band, under `BAND_COLUMNS`; at the scans too where these were given."""
+    rows = [*_rows("feedback (PV)", c.feedback), *_rows("setpoint", c.setpoint)]
+    if c.feedback_at_scan is not None and c.setpoint_at_scan is not None:
+        rows += _rows("feedback, at the scans", c.feedback_at_scan)
+        rows += _rows("setpoint, at the scans", c.setpoint_at_scan)
+    return rows
+
+
+def _rows(title: str, p: PathComparison) -> list[list[str]]:
+    out = []
+    for name, band in (("loop band", p.loop_band), ("full band", p.full_band)):
+        ends = f"{band.low:.3g} to {band.high:.3g}"
+        out.append([title, name, ends, percent(band.max_deviation), decibels(band), degrees(band)])
+        title = ""
+    return out
+
+
+def emulation_line(c: Certificate) -> str:
+    """Return what running both against each other gave; nothing where they were not."""
+    e = c.scan_by_scan
+    if e is None:
+        return ""
+    scans = f"{number(e.scan[0])} s" if e.scan[0] == e.scan[1] else f"{number(e.scan[0])} s and {number(e.scan[1])} s"
+    taken = " (taken, as none was given)" if e.taken else ""
+    if e.is_exact:
+        return f"run against each other every {scans}{taken} without limits: the same output, scan by scan"
+    still = "none" if e.is_exact_on_measurement else f"{number(float(f'{e.on_measurement:.2g}'))} %"
+    return (
+        f"run against each other every {scans}{taken} without limits: outputs differ by up to "
+        f"{number(float(f'{e.largest:.2g}'))} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
+        f"{number(float(f'{e.size:.3g}'))} %), while the setpoint rests: {still}"
+    )
+
+
+def kick_line(c: Certificate) -> str:
+    """Return what a setpoint step does to both outputs at once."""
+    kick, what = c.setpoint_kick_at_scan, "setpoint kick, output step in the first scan"
+    if kick is None:
+        kick, what = c.setpoint_kick, "setpoint kick (output step per setpoint step, at once)"
+    return f"{what}: {number(kick.source)} on the source, {number(kick.target)} on the target"
+
+
+def rounding_line(c: Certificate) -> str:
+    """Return what rounding the dials did to the deviation in the loop band; nothing where none was rounded."""
+    before = c.feedback_before_rounding
+    if before is None:
+        return ""
+    old, new = before.loop_band.max_deviation, c.feedback.loop_band.max_deviation
+    return f"deviation in the loop band before rounding: {percent(old)}, after: {percent(new)}"
+
+
+def textbook_line(c: Conversion) -> str:
+    """Return how near the textbook rule would come; nothing where it is what was used."""
+    book = c.textbook
+    if book.certificate is None:
+        return f"the textbook rule has no answer: {book.reason}"
+    if c.match == "textbook":
+        return ""
+    band = book.certificate.feedback.loop_band
+    if band.max_deviation < EXACT:
+        return "the textbook rule gives the same law for measurement"
+    return f"the textbook rule would deviate by {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band"
+
+
+def loop_rows(loop: LoopComparison) -> list[list[str]]:
+    """Return the closed loop's figures: name, before, after."""
+    both = (loop.source, loop.target)
+    rows = [[name, *(number(float(f"{getattr(x, attribute):.4g}")) for x in both)] for name, attribute in _LOOP_ROWS]
+    return [*rows, ["stable", *("yes" if x.stable else "NO" for x in both)]]

@@ -1,0 +1,156 @@
+"""Source and target emulated on the same signals, scan by scan: point 3 of the certificate (specs/equations.md, section 9)."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.canonical import default_scan
+from pidemu.certificate.linear import time_scale
+from pidemu.certificate.models import EXACT, ScanByScan
+from pidemu.errors import ScanError
+from pidemu.record.files import Record
+from pidemu.record.playback import Timing
+from pidemu.record.sampling import Scale, controller_for
+from pidemu.record.standard import REST, Segment, StandardRecord, scale_of, standard_record
+from pidemu.scan.build import Action
+from pidemu.settings import Settings
+
+Floats = npt.NDArray[np.float64]
+
+WIDE: Final = (-1e12, 1e12)
+"""Output limits that no signal of the record reaches [%]."""
+_LINEAR_UNTIL: Final = "large positive error"
+"""The first part of the standard record that is meant to reach a limit."""
+_FINEST: Final = 2000
+"""Scans per characteristic time: more would take long and show nothing new."""
+_ENOUGH, _COARSEST = 200, 20
+"""The same where the interval is ours to take: as many as show what there is, and fewer would leave nothing to see."""
+_HAIR: Final = 1e-6
+_TRIES: Final = 6
+
+
+def common_interval(source: Settings, target: Settings) -> float:
+    """Return a scan interval for both controllers where nobody gave any [s].
+
+    It is the source card's, made to suit the settings: between a 200th and a 20th of the effective integral time, and short enough
+    for the filters of both.
+
+    Raises
+    ------
+    ScanError
+        No interval suits both.
+    """
+    time = time_scale(source.law())
+    h = min(max(default_scan(source.equation), time / _ENOUGH), time / _COARSEST)
+    for _ in range(_TRIES):
+        with suppress(ScanError):
+            source.law(h), target.law(h)
+            return h
+        h /= 4
+    source.law(h), target.law(h)
+    return h
+
+
+def record_for(source: Settings, h: float) -> StandardRecord:
+    """Return the part of the standard record that is meant to reach no limit, scaled to a controller, scanned every `h` [s]."""
+    time, size = scale_of(source, h)
+    return _linear_part(standard_record(h, 1, min(time, _FINEST * h), size))
+
+
+def _times(record: Record) -> Floats:
+    assert record.time is not None  # the standard record has it
+    return record.time
+
+
+def _linear_part(record: StandardRecord) -> StandardRecord:
+    kept = tuple(s for s in record.segments if s.start < next(s.start for s in record.segments if s.name == _LINEAR_UNTIL))
+    times = _times(record)
+    n = int(np.searchsorted(times, kept[-1].end * (1 - 1e-9)))
+    return replace(record, sp=record.sp[:n], pv=record.pv[:n], time=times[:n], auto=None, manual=None, segments=kept)
+
+
+def emulated(
+    source: Settings, target: Settings, scans: tuple[float, float], factor: float = 1.0, *, taken: bool = False
+) -> ScanByScan:
+    """Run both controllers on the linear part of the standard record and compare their outputs.
+
+    Parameters
+    ----------
+    source, target : Settings
+        The settings.
+    scans : tuple of float
+        Scan intervals of source and target [s].
+    factor : float
+        What the source's gain is multiplied by for new signal ranges; negative where the action changes.
+    taken : bool
+        Whether nobody gave these intervals.
+
+    Raises
+    ------
+    ScanError
+        A controller cannot be run at its interval.
+    """
+    record = record_for(source, scans[0])
+    other = record if scans[0] == scans[1] else _again(record, scans[1])
+    mine_at, theirs_at = _times(record), _times(other)
+    at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
+    mine, theirs = _Bench(source, scans[0], "reverse"), _Bench(target, scans[1], "reverse" if factor > 0 else "direct")
+    ours = REST + abs(factor) * (mine.outputs(record) - REST)
+    apart = _apart(ours, theirs.outputs(other)[at])
+    exact = bool(np.max(apart) <= EXACT * 100)  # then they agree on the measurement alone as well
+    still = (
+        apart if exact else _apart(REST + abs(factor) * (mine.outputs(_still(record)) - REST), theirs.outputs(_still(other))[at])
+    )
+    worst = int(np.argmax(apart))
+    when = float(mine_at[worst])
+    return ScanByScan(
+        scan=scans,
+        taken=taken,
+        largest=float(apart[worst]),
+        largest_at=when,
+        segment=_segment_at(record.segments, when + _HAIR * scans[0]),
+        on_measurement=float(np.max(still)),
+        size=float(np.max(np.abs(ours - REST))),
+    )
+
+
+def _again(record: StandardRecord, h: float) -> StandardRecord:
+    return _linear_part(standard_record(h, record.seed, record.characteristic_time, record.size))
+
+
+def _segment_at(segments: tuple[Segment, ...], when: float) -> str:
+    return next((s.name for s in segments if s.start <= when < s.end), segments[-1].name)
+
+
+def _still(record: StandardRecord) -> StandardRecord:
+    return replace(record, sp=np.full_like(record.sp, REST))
+
+
+def _apart(ours: Floats, theirs: Floats) -> Floats:
+    apart: Floats = np.nan_to_num(np.abs(theirs - ours), nan=np.inf)
+    return apart
+
+
+class _Bench:
+    """A controller that begins every record at rest."""
+
+    def __init__(self, settings: Settings, h: float, action: Action) -> None:
+        self._scale = Scale(settings)
+        self._controller, _ = controller_for(settings, Timing(h), action, WIDE, REST)
+        self._rest: dict[str, float] | None = None
+
+    def outputs(self, record: Record) -> Floats:
+        """Return the outputs on a record [%]."""
+        own = self._scale.own(record)
+        if self._rest is None:
+            self._controller.rest(float(own.sp[0]), float(own.pv[0]), self._scale.output_own(REST))
+            self._rest = self._controller.state
+        else:  # every record begins at the same rest
+            self._controller.reset()
+            self._controller.start(**self._rest)
+        return self._scale.output_percent(self._controller.run(own.sp, own.pv))

@@ -1,0 +1,1 @@
+"""Changing over from one controller to another without a bump."""

@@ -1,0 +1,171 @@
+"""The integral of the absolute error after a load step (specs/equations.md, section 9, point 6)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from math import nan
+from typing import Final
+
+from pidemu.algorithm import Algorithm, Lag
+from pidemu.card.base import Rule
+from pidemu.law import Law
+from pidemu.loop.figures import loop_figures, scan_for, time_scale
+from pidemu.loop.hold import Plant
+from pidemu.loop.open_loop import OpenLoop
+from pidemu.loop.process import Process
+from pidemu.running import Running, resting
+from pidemu.scan.build import build
+from pidemu.scan.program import Program
+from pidemu.settings import Settings
+
+_WIDE: Final = (-1e12, 1e12)
+_SMALL: Final = 1e-6
+"""Size of the load step that is simulated [%]: far from whatever depends on size."""
+_SETTLED: Final = 1e-7
+"""Two blocks with at most this share of the integral are the last."""
+_MOST_SCANS: Final = 1_000_000
+_FINE: Final = 100
+"""Scans in the time in which the loop moves, to simulate a continuous controller."""
+
+
+def load_iae(settings: Settings, process: Process, scan: float | None = None, factor: float = 1.0) -> float:
+    """Return the integral of the absolute error after a load step of 1 % at the process input, in the linear range.
+
+    The scan program of the algorithm runs in a closed loop with the process, without what depends on the size of signals: limits,
+    deadbands, steps of the output, rounding to float32 or integers. The action is that of negative feedback.
+
+    Parameters
+    ----------
+    settings : Settings
+        Card and settings.
+    process : Process
+        The process.
+    scan : float, optional
+        Scan interval [s]; by default that of `pidemu.loop.figures.scan_for`.
+    factor : float
+        What the controller's gain is multiplied by; its sign does not count.
+
+    Returns
+    -------
+    float
+        The integral, by the trapezoidal rule between scans [% s]. Infinite where the loop is unstable, and where the error does not
+        go to zero because nothing integrates.
+
+    Raises
+    ------
+    ScanError
+        A filter is unstable at the scan interval.
+    """
+    law = settings.law(scan_for(settings, process) if scan is None else scan)
+    return _iae(law, process, factor, loop_figures(law, process, factor).stable)
+
+
+def continuous_load_iae(settings: Settings, process: Process, factor: float = 1.0) -> float:
+    """Return the same for the continuous law, without sampling.
+
+    Two short scan intervals are extrapolated to none; the backward rule stands for all, which then are alike.
+    """
+    law = settings.law()
+    if not loop_figures(law, process, factor).stable:
+        return math.inf
+    h = time_scale(law, process, factor) / _FINE
+    long, short = (_iae(Law(_as_continuous(law.algorithm), t), process, factor, True) for t in (h, h / 2))
+    return 2 * short - long if math.isfinite(long) else math.inf
+
+
+def _iae(law: Law, process: Process, factor: float, stable: bool) -> float:
+    """Return the integral for a discrete law; the factor is put into the process, which then needs a smaller load."""
+    a, h = law.algorithm, law.scan
+    assert h is not None
+    if not stable or not (a.ki or a.dahlin is not None or 0 in process.zeros):
+        return math.inf
+    moves = time_scale(law, process, factor)
+    block = process.delay + max(min(10 * moves, 20 * process.time), moves / 5)
+    scans = math.ceil(block / h)
+    shares = _shares(a, h, replace(process, gain=process.gain * OpenLoop(law, process, factor).gain), scans)
+    return _summed(shares, _MOST_SCANS // scans + 4) / abs(factor)
+
+
+def _summed(shares: Iterator[float], most: int) -> float:
+    """Return the sum of the integral's shares, block by block.
+
+    A slow mode that is left over decays geometrically from block to block; its sum is known long before it has gone.
+    """
+    found: list[float] = []
+    while len(found) < most:
+        found.append(next(shares))
+        if len(found) > 2 and max(found[-2:]) <= _SETTLED * sum(found):
+            return sum(found)
+        if len(found) > 3 and found[-1] < found[-2] and _is_geometric(found[-4:]):
+            return sum(found) + _tail(found[-2], found[-1])
+    half = len(found) // 2
+    before, after = sum(found[:half]), sum(found[half : 2 * half])
+    return sum(found) + _tail(before, after) if after < before else math.inf
+
+
+def _is_geometric(shares: list[float]) -> bool:
+    first, second, third = (y / x for x, y in itertools.pairwise(shares))
+    return max(abs(second - first), abs(third - second)) < 1e-4 * (1 - third)
+
+
+def _tail(before: float, after: float) -> float:
+    """Return the sum of what is to come after two terms of a geometric series."""
+    return after * after / (before - after)
+
+
+def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Iterator[float]:
+    """Yield the integral of the absolute error per block of scans, after a load step of 1 % from rest [% s]."""
+    a = _linear(algorithm)
+
+    def make(h: float, *, at_rest: bool = False) -> Program:
+        return build(resting(a) if at_rest else a, h, limits=_WIDE)
+
+    running = Running(make, h)
+    running.take_over({"u": 0.0}, {"sp": 0.0, "pv": 0.0, "auto": 1.0, "manual": nan})
+    scan, state, plant = running.compiled.scan, running.state, Plant(process.sampled(h))
+    last = 0.0
+    while True:
+        total = 0.0
+        for _ in range(scans):
+            y = plant.measure()
+            total += abs(y + last) / 2 if y * last >= 0 else (y * y + last * last) / (2 * abs(y - last))
+            last = y
+            plant.move(scan(state, 0.0, y, 1.0, nan) + _SMALL)
+        yield total * h / _SMALL
+
+
+def _linear(a: Algorithm) -> Algorithm:
+    """Return the algorithm without what the linear law leaves out."""
+    return replace(
+        a,
+        precision="float64",
+        shape=None,
+        integral_deadband=None,
+        integral_limits=None,
+        sp_rate=math.inf,
+        output_rate=math.inf,
+        output_deadband=0.0,
+        resolution=0.0,
+        bias=0.0,
+    )
+
+
+def _as_continuous(a: Algorithm) -> Algorithm:
+    """Return the algorithm with the backward rule throughout, and filter times that do not depend on the scan interval."""
+
+    def lag(x: Lag | None) -> Lag | None:
+        return None if x is None else Lag(x.time)
+
+    return replace(
+        a,
+        integral_rule=Rule.BACKWARD,
+        derivative_rule=Rule.BACKWARD,
+        filter_rule=Rule.BACKWARD,
+        sp_filter=lag(a.sp_filter),
+        pv_filter=lag(a.pv_filter),
+        e_filter=lag(a.e_filter),
+        previous_pv=False,
+    )

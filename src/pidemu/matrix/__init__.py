@@ -1,0 +1,1 @@
+"""Every card to every card."""
