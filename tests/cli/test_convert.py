@@ -154,7 +154,8 @@ def test_a_refusal_without_any_useful_settings_offers_none() -> None:
     assert (status, out) == (1, "")
     assert err == (
         "error: refused: emerson/deltav cannot do what fisher/provox does: the source has integral action, "
-        "emerson/deltav (FORM=Standard, STRUCTURE=4) has none; no settings of it come near; other options would do: --set STRUCTURE=1: exact\n"
+        "emerson/deltav (FORM=Standard, STRUCTURE=4) has none; no settings of it come near; "
+        "other options would do: --set STRUCTURE=1: exact\n"
     )
     assert strict_json(said(*HOPELESS, "--json").out)["verdict"] == "refused"
 

@@ -17,7 +17,7 @@ from pidemu.errors import ConversionRefusedError, ScanError
 from pidemu.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, settings_that_act
 from tests.conversion.test_options import CARDS, SOURCES
-from tests.helpers import linear
+from tests.helpers import WIDE, Floats, linear
 
 PAIRS = list(itertools.product(CARDS, CARDS))
 SCANS = st.none() | st.floats(0.2, 3).map(lambda h: (h, h)) | st.tuples(st.floats(0.1, 2), st.floats(0.1, 2))
@@ -31,18 +31,29 @@ def convert(source: Settings, target: str, **arguments: object) -> Conversion:
     try:
         return pidemu.convert(source, target, given=held, **arguments)  # type: ignore[arg-type]
     except ConversionRefusedError as refusal:
-        assert len(str(refusal)) > 20, "a refusal has a reason"
-        assert target in str(refusal)
-        if refusal.nearest is not None:
-            assert_in_range(refusal.nearest.settings)
-            assert refusal.nearest.certificate.feedback.loop_band.max_deviation < 1  # nearer than no controller at all
+        check_refusal(refusal, target)
         raise
+
+
+def check_refusal(refusal: ConversionRefusedError, target: str) -> None:
+    assert len(str(refusal)) > 20, "a refusal has a reason"
+    assert target in str(refusal)
+    if refusal.nearest is not None:
+        assert_in_range(refusal.nearest.settings)
+        assert refusal.nearest.certificate.feedback.loop_band.max_deviation < 1  # nearer than no controller at all
 
 
 def assert_in_range(found: Settings) -> None:
     for name, value in found.items():
         low, high = limits(value.setting)
         assert value.off or low <= value.value <= high, f"{name} = {value.value}"
+
+
+def from_rest(s: Settings, sp: Floats, pv: Floats, h: float) -> Floats:
+    """Output of a controller that no limit touches, and that has been at rest at 50 % before."""
+    controller = pidemu.Controller(s, h, output_limits=WIDE, initial_output=50.0)
+    controller.rest(50.0, 50.0, 50.0)
+    return controller.run(sp, pv)
 
 
 def drawn(data: st.DataObject) -> tuple[Settings, str]:
@@ -71,7 +82,7 @@ def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
     sp, pv = random_signal(11, 120), random_signal(12, 120)
     if verdict == "exact-feedback":
         sp = np.full(120, 50.0)
-    a, b = (outputs(s, sp, pv, h[0]) for s in (conversion.source, conversion.settings))
+    a, b = (from_rest(s, sp, pv, h[0]) for s in (conversion.source, conversion.settings))
     if not source.algorithm().ki:  # positional: counted from the bias; velocity: from the output at the transfer
         a, b = a - a[0], b - b[0]
     # the laws agree per frequency to 1e-9, an output adds up 120 scans of it

@@ -38,9 +38,9 @@ def test_the_table_that_makes_it_the_default_is_reproduced_to_its_digits(match: 
 
 def test_the_textbook_rule_is_shown_beside_the_default_with_its_figures() -> None:
     source = pidemu.load_card("generic/series").settings(K=1, Ti=60, Td=15, alpha=0.1)
-    fixed = {"given": {"ALPHA": 0.125}, "options": {"FORM": "Standard", "STRUCTURE": "1"}}
-    conversion = pidemu.convert(source, "emerson/deltav", **fixed)
-    alone = pidemu.convert(source, "emerson/deltav", **fixed, match="textbook")
+    options, alpha = {"FORM": "Standard", "STRUCTURE": "1"}, {"ALPHA": 0.125}
+    conversion = pidemu.convert(source, "emerson/deltav", options=options, given=alpha)
+    alone = pidemu.convert(source, "emerson/deltav", options=options, given=alpha, match="textbook")
     assert conversion.textbook.settings == alone.settings
     assert conversion.textbook.certificate is not None
     assert conversion.textbook.certificate.feedback == alone.certificate.feedback

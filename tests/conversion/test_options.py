@@ -82,7 +82,7 @@ def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -
     conversion = pidemu.convert(source, "foxboro/ia-pid")
     assert dict(conversion.chosen) == {"MODE": "P"}
     assert conversion.verdict == "exact"
-    with pytest.raises(ConversionRefusedError, match="has no derivative action|cannot be switched off|cannot do"):
+    with pytest.raises(ConversionRefusedError, match="cannot do"):
         pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "PID"})
 
 
@@ -138,7 +138,7 @@ def test_the_scan_rules_of_the_target_are_chosen_like_the_source_s() -> None:
     forced = pidemu.convert(source, "mathworks/pid2", options={"IFormula": "Trapezoidal", "DFormula": "Trapezoidal"})
     assert forced.certificate.feedback.is_exact
     assert forced.verdict == "approximate"
-    assert "the two equations are the same" in forced.sentence.lower()
+    assert "the two equations are the same" in forced.sentence
 
 
 def test_negative_gains_become_positive_ones_with_the_other_action() -> None:

@@ -8,10 +8,12 @@ from typing import Any
 import click
 
 from pidemu.card.library import load_card
+from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_plan, print_ranking, print_refusal
 from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.conversion.convert import convert
 from pidemu.errors import ConversionRefusedError
+from pidemu.settings import Settings
 
 
 @click.command("convert", short_help="Convert settings to another card, with a certificate.")
@@ -117,17 +119,10 @@ def command(
 
         arguments["process"] = parse_process(process)
     if word is not None:
-        from pidemu.ambiguity.readings import readings
-        from pidemu.cli.readings import refuse_to_choose
-
-        found = readings(word, {**given, **ranges}, vendors=vendors)
-        if len(found) > 1:
-            also = [*(["--process", process] if process else []), *(["--no-compensation"] if plain else [])]
-            refuse_to_choose(found, goal, arguments, to=target, also=also, as_json=as_json)
-        source = found[0].settings
+        also = [*(["--process", process] if process else []), *(["--no-compensation"] if plain else [])]
+        source = _only_reading(word, {**given, **ranges}, goal, arguments, target, also, vendors, as_json)
     else:
-        assert card is not None
-        source = load_card(card, vendors).settings({**given, **ranges})
+        source = load_card(card or "", vendors).settings({**given, **ranges})
     try:
         conversion = convert(source, goal, **arguments)
     except ConversionRefusedError as error:
@@ -148,6 +143,26 @@ def command(
         print_ranking(conversion)
     if page is not None:
         click.echo(f"\nwritten: {page}")
+
+
+def _only_reading(
+    word: str,
+    given: dict[str, object],
+    goal: Card,
+    arguments: dict[str, Any],
+    to: str,
+    also: list[str],
+    vendors: tuple[str, ...],
+    as_json: bool,
+) -> Settings:
+    """Return the settings that can be meant; where there are several, print them all and exit."""
+    from pidemu.ambiguity.readings import readings
+    from pidemu.cli.readings import refuse_to_choose
+
+    found = readings(word, given, vendors=vendors)
+    if len(found) > 1:
+        refuse_to_choose(found, goal, arguments, to=to, also=also, as_json=as_json)
+    return found[0].settings
 
 
 def _signals(text: str) -> tuple[float, float, float]:

@@ -78,6 +78,8 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     by_multiplier = target.form is Form.PARALLEL and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
     if not filt.free and not by_multiplier:
         raise NoMatchError("the target's filter is fixed")
+    if filt.needed and n2 and not d1:
+        raise NoMatchError("the target's derivative always has a filter, the source's has none")
     wanted_d2 = d1 * d1 / 2 if shape.filter_order == 2 and shape.filter_on == "measurement" else 0.0
     if abs(d2 - wanted_d2) > _ROUNDING * max(d1 * d1, abs(d2)):
         raise NoMatchError("the two filters are of different order")

@@ -64,23 +64,33 @@ Way = Callable[[Problem, Sequence[float]], Sequence[float]]
 def meet(problem: Problem) -> Sequence[float]:
     """Return moments for which the target's law, sampled and held, has the moments of the source's.
 
-    A scan rule and a hold change ``m1`` by ``h m0`` and ``m2`` by ``h m1``: what is missing is added to what is asked for, until
-    nothing is. At equal intervals two unfiltered laws then have the same three coefficients of their increments: they are equal.
+    A scan rule and a hold change ``m1`` by ``h m0`` and ``m2`` by ``h m1``. What makes up for that is found by Newton's method; the
+    map is nearly linear. At equal intervals two unfiltered laws then have the same three coefficients of their increments: they
+    are equal. Moments that the target has no term for stay as they are.
 
     Raises
     ------
     NoMatchError
         There are none: the intervals are too long for the settings.
     """
-    wanted = problem.wanted.held_expansion(3)
-    size = sizes(wanted)
-    asked = list(wanted)
+    wanted = np.array(problem.wanted.held_expansion(3))
+    size = np.array(sizes(wanted.tolist()))
+
+    def missing(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        found: npt.NDArray[np.float64] = np.array(problem.law((x * size).tolist()).held_expansion(3))
+        apart: npt.NDArray[np.float64] = (wanted - found) / size
+        return apart
+
+    x = wanted / size
     for _ in range(_ROUNDS):
-        missing = [w - x for w, x in zip(wanted, problem.law(asked).held_expansion(3), strict=True)]
-        asked = [a + m for a, m in zip(asked, missing, strict=True)]
-        if not all(map(math.isfinite, asked)):
+        off = missing(x)
+        slope = np.stack([(missing(x + _STEP * e) - off) / _STEP for e in np.eye(3)], axis=1)
+        if not (np.isfinite(slope).all() and np.isfinite(off).all()):
             break
-        if all(abs(m) <= _CONVERGED * s for m, s in zip(missing, size, strict=True)):
+        step = np.linalg.lstsq(slope, -off, rcond=1e-9)[0]
+        x = x + step
+        if float(np.max(np.abs(step))) <= _CONVERGED * max(1.0, float(np.max(np.abs(x)))):
+            asked: list[float] = (x * size).tolist()
             return asked
     raise NoMatchError("the scan intervals are too long for these settings")
 

@@ -221,7 +221,7 @@ class Solver:
     def _at_scans(self, settings: Settings, match: Match | None) -> tuple[Settings, Match]:
         """Return settings whose sampled, held law has the source's moments; where these are not nearer, the given ones."""
         with suppress(NoMatchError, SettingError, ScanError):
-            bent = self._through(self._met, settings)
+            bent = self._through(self._met, settings, derivative=bool(self.scaled.algorithm.kd))
             if self.deviation(bent) < self.deviation(settings) * (1 - _CLEARLY):
                 settings = bent
         if self.certify(settings).headline.is_exact:
@@ -239,7 +239,8 @@ class Solver:
             if not kd:
                 break
             apart = law.held_expansion(4)[3] - problem.wanted.held_expansion(4)[3]
-            wanted = max(0.0, Tf + apart / kd)  # m3 holds -kd Tf
+            least = 0.5 * (problem.scan or 0.0) if self.target.filter.needed else 0.0  # below it hardly anything is left
+            wanted = max(least, Tf + apart / kd)  # m3 holds -kd Tf
             self.target.filter = self.target.filter.nearest_to(wanted, self._derivative_time(problem.numbers(asked)))
             asked = meet(problem)
             if abs(wanted - Tf) <= _CLEARLY * wanted:
@@ -339,8 +340,10 @@ class Solver:
             chosen = filt.setting is not None and filt.setting not in self.target.given
             yield replace(numbers, Tf=self._time_of(numbers)) if chosen else numbers
 
-    def _through(self, solve: Way, start: Settings | None = None, *, sampled: bool = True) -> Settings:
+    def _through(self, solve: Way, start: Settings | None = None, *, sampled: bool = True, derivative: bool = True) -> Settings:
         """Return settings found by way of their moments, with the filter that the closed form would have.
+
+        Without `derivative` there is none, whatever the second moment asks for.
 
         Raises
         ------
@@ -354,7 +357,9 @@ class Solver:
         self.target.filter = filt
 
         def numbers(moments: Sequence[float]) -> Numbers:
-            return next(iter(self._matched(moments, self.target.filter)))
+            if derivative:
+                return next(iter(self._matched(moments, self.target.filter)))
+            return replace(next(iter(self._matched((*moments[:2], 0.0), self.target.filter))), kd=0.0)
 
         scans = self.scans if self.compensates and sampled else None
         wanted = self.at_source_scan if scans and self.at_source_scan else self.law
@@ -396,7 +401,8 @@ class Solver:
         _, m1, m2, m3 = self.scaled.expansion(4)
         if m2 == 0:
             return 0.0, 0.0
-        per = 1.0 if self.target.form is Form.PARALLEL else m1 or self.target.idle_gain
+        plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"
+        per = 1.0 if plain else m1 or self.target.idle_gain
         return max(0.0, -m3 / m2), m2 / per
 
     def _weighted(self, numbers: Numbers, problem: Problem | None = None) -> Settings:

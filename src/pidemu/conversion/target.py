@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import gain_sign
-from pidemu.card.base import Form
+from pidemu.card.base import Form, Rule
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
@@ -21,6 +21,8 @@ from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 FilterKind = Literal["none", "time", "ratio", "gain"]
 
 _CORE: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+_HARDLY: Final = 100.0
+"""Derivative gain of a filter that is hardly one."""
 _WEIGHTS: Final = (Role.PROPORTIONAL_WEIGHT, Role.DERIVATIVE_WEIGHT)
 
 
@@ -78,6 +80,8 @@ class TargetFilter:
         Whether the conversion may choose it.
     value : float
         Its present value: time [s], ratio or gain.
+    needed : bool
+        Whether the derivative is nothing without it: the lagged-difference rule.
     lead_lag : bool
         Whether it is the lag of a lead-lag.
     effective : bool
@@ -90,6 +94,7 @@ class TargetFilter:
     setting: str | None = None
     free: bool = False
     value: float = 0.0
+    needed: bool = False
     lead_lag: bool = False
     effective: bool = False
     low: float = 0.0
@@ -108,13 +113,16 @@ class TargetFilter:
         return self.value if self.kind == "time" else 0.0
 
     def nearest_to(self, Tf: float, base: float) -> TargetFilter:
-        """Return the filter fixed at the allowed value nearest to `Tf` [s]; `base` is the derivative time it refers to [s]."""
+        """Return the filter fixed at the allowed value nearest to `Tf` [s]; `base` is the derivative time it refers to [s].
+
+        Where none is wanted of a target that always has one, it is a hundredth of the derivative time: far above the loop band.
+        """
         if self.kind == "time":
-            wanted = Tf
+            wanted = Tf or (base / _HARDLY if self.needed else 0.0)
         elif self.kind == "ratio":
             wanted = Tf / base if base > 0 else self.value
         elif self.kind == "gain":
-            wanted = base / Tf if Tf > 0 else self.high if math.isfinite(self.high) else self.value
+            wanted = base / Tf if Tf > 0 else min(self.high, max(_HARDLY, self.value))
         else:
             return self
         return replace(self, free=False, value=min(max(wanted, self.low), self.high))
@@ -206,6 +214,7 @@ class Target:
         kind: FilterKind = "ratio" if filt.ratio is not None else "gain" if filt.gain is not None else "time"
         given = filt.ratio if kind == "ratio" else filt.gain if kind == "gain" else filt.time
         shape = {"lead_lag": filt.applies_to == "lead-lag", "effective": filt.of == "effective-derivative"}
+        shape["needed"] = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
         if not isinstance(given, str):
             return TargetFilter(kind, None, False, float(given or 0.0), **shape)
         setting = self.variant.equation.settings[given]
