@@ -148,7 +148,8 @@ USAGE = {
     ),
     f"convert {_PI} {_TO} --match best": (
         "convert",
-        "Invalid value for '--match': 'best' is not one of 'exact', 'low-frequency', 'textbook'.",
+        "Invalid value for '--match': match is 'best'; it is one of exact, low-frequency, textbook, frequency, loop, constrained, "
+        "or frequency:0.02rad/s",
     ),
     f"run {_PI}": ("run", "Missing option '--record'."),
     f"run {_PI} --record good.csv --scan fast": ("run", "Invalid value for '--scan': 'fast' is not a valid float."),

@@ -190,7 +190,7 @@ def test_another_unit_and_a_default_are_said() -> None:
 @pytest.mark.parametrize("name", MADE)
 def test_the_figures_are_those_of_the_certificate(name: str) -> None:
     c = made(name).certificate
-    compared = [p for p in (c.feedback, c.setpoint, c.feedback_at_scan, c.setpoint_at_scan) if p is not None]
+    compared = [p for p in (c.feedback_at_scan, c.setpoint_at_scan, c.feedback, c.setpoint) if p is not None]
     bands: list[Band] = [b for p in compared for b in (p.loop_band, p.full_band)]
     rows = table(page(name), "figures")
     assert len(rows) == len(bands)

@@ -73,12 +73,15 @@ def other_units(v: Value) -> str:
 
 
 def band_rows(c: Certificate) -> list[list[str]]:
-    """Return how far the two are apart by path and band, under `BAND_COLUMNS`; at the scans too where these were given."""
-    rows = [*_rows("feedback (PV)", c.feedback), *_rows("setpoint", c.setpoint)]
-    if c.feedback_at_scan is not None and c.setpoint_at_scan is not None:
-        rows += _rows("feedback, at the scans", c.feedback_at_scan)
-        rows += _rows("setpoint, at the scans", c.setpoint_at_scan)
-    return rows
+    """Return how far the two are apart by path and band, under `BAND_COLUMNS`: first at the scans, where these were given."""
+    if c.feedback_at_scan is None or c.setpoint_at_scan is None:
+        return [*_rows("feedback (PV)", c.feedback), *_rows("setpoint", c.setpoint)]
+    return [
+        *_rows("feedback, at the scans", c.feedback_at_scan),
+        *_rows("setpoint, at the scans", c.setpoint_at_scan),
+        *_rows("feedback, continuous", c.feedback),
+        *_rows("setpoint, continuous", c.setpoint),
+    ]
 
 
 def _rows(title: str, p: PathComparison) -> list[list[str]]:

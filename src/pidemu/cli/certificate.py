@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from pidemu.card.load import Card
@@ -15,9 +17,11 @@ from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.choices import Attempt
 from pidemu.conversion.convert import Conversion
-from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
+
+if TYPE_CHECKING:
+    from pidemu.cutover.plan import TransferPlan
 
 
 def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, as_json: bool) -> None:

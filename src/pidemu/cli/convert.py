@@ -11,9 +11,18 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_plan, print_ranking, print_refusal
 from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
-from pidemu.errors import ConversionRefusedError
+from pidemu.errors import ConversionRefusedError, SettingError
 from pidemu.settings import Settings
+
+
+def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> str | None:
+    try:
+        read_aim(text)
+    except SettingError as error:
+        raise click.BadParameter(str(error)) from None
+    return text
 
 
 @click.command("convert", short_help="Convert settings to another card, with a certificate.")
@@ -44,6 +53,7 @@ from pidemu.settings import Settings
 @click.option(
     "--match",
     metavar="MATCH",
+    callback=_match,
     help="exact, low-frequency, textbook, frequency:0.02rad/s, constrained; with --process also frequency (at the crossover) "
     "and loop. By default exact where possible, else low-frequency.",
 )
