@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.card.stages import STARTS
 from pidemu.certificate import nonlinear
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.nonlinear import STARTS, nonlinear_differences
+from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.sides import Side
 from pidemu.certificate.trials import Plan, Trial, tried
 from pidemu.record.standard import scale_of

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from pidemu.card.base import Flag, Model, Number, Reference, Text
+
+STARTS: Final = {
+    "bumpless": "does not bump",
+    "load-output": "loads the output into the integral and bumps by its other terms",
+    "tracked": "lets the integral track the output in manual and goes on from there",
+    "keep": "keeps the integral as it stood",
+    "zero": "starts with an integral of zero",
+    "running": "computes on in manual, so that the output jumps to what it has computed",
+}
+"""What a transfer to automatic does, by `transfer.start`: said of a controller, as in "X does not bump"."""
 
 
 class Transfer(Model):
@@ -18,6 +28,13 @@ class Transfer(Model):
         "set every scan to what the output leaves for it, and the first automatic scan moves on from there. `keep`: the integral "
         "stands as it stood. `zero`: it starts at zero. `running`: the algorithm runs on in manual, and only its output is not "
         "used."
+    )
+    preset: Literal["none", "output", "integral", "initial"] = Field(
+        default="none",
+        description="What a user can set by hand for the transfer. `none`: no source says that there is such a thing. `output`, "
+        "with `load-output`: the value that is loaded, which may be another than the last output. `integral`, with `keep`, `zero` "
+        "and `running`: what the integral holds (`integral.holds`), at any time. `initial`, with these: the same, before the first "
+        "scan of all only.",
     )
     derivative: Literal["running", "restarted", "zeroed", "preset"] = Field(
         default="running",

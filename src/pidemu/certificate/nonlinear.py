@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from pidemu.card.at_limits import limit_rows
+from pidemu.card.stages import STARTS
 from pidemu.certificate.arithmetic import arithmetic_differences
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.sides import Side, sides
@@ -17,15 +18,6 @@ from pidemu.errors import PidemuError
 from pidemu.record.sampling import limits_for
 from pidemu.settings import Settings
 
-STARTS: Final = {
-    "bumpless": "does not bump",
-    "load-output": "loads the output into the integral and bumps by its other terms",
-    "tracked": "lets the integral track the output in manual and goes on from there",
-    "keep": "keeps the integral as it stood",
-    "zero": "starts with an integral of zero",
-    "running": "computes on in manual, so that the output jumps to what it has computed",
-}
-"""What a transfer to automatic does, by `transfer.start`."""
 _MANUAL: Final = {
     "operator": "takes the operator's output",
     "gain-times-operator": "multiplies the operator's output by the gain",

@@ -1,0 +1,97 @@
+"""What a plan for the cut-over rests on, and what it cannot avoid: its notes, as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pidemu.card.base import Evidence, Status
+from pidemu.card.stages import STARTS
+from pidemu.cutover.bench import Bench
+from pidemu.cutover.trials import LONGEST, Cut, Way, is_none, resolution
+from pidemu.units import Role
+
+
+def notes(bench: Bench, way: Way, cut: Cut) -> Iterator[str]:
+    """Yield what the plan rests on, and what it cannot avoid and why."""
+    card = bench.settings.card.id
+    yield _what_starts(bench, way, card)
+    yield from _start_evidence(bench)
+    if bench.entry is None:
+        yield "without the plan means that the first scan it ever makes goes to the valve"
+    yield from _preset(bench, way, card)
+    if way.bias is not None and bench.settings.by_role(Role.BIAS) is None:
+        yield f"{card} names no setting for a bias; without it the output moves as without the plan"
+    if cut.increment:
+        yield f"the integral adds {bench.out.percent(cut.increment):.6g} % of span per scan: that is control and no bump"
+    if way.sp != bench.sp:
+        follows = (
+            "in manual its setpoint follows the measurement, and stays there" if bench.a.sp_tracks else "it starts at an error of 0"
+        )
+        yield f"{follows}; giving the setpoint back moves the output by {bench.out.percent(cut.kick):.6g} % of span in one scan"
+    if cut.waited is None:
+        yield f"its filters and differences have not settled after {LONGEST} scans; the bump is that of then"
+    if bench.a.precision != "float64":
+        yield f"{bench.a.precision} arithmetic: {resolution(bench, cut):.2g} % of span is its rounding, and no bump"
+    ranges = (bench.settings.pv_range, bench.settings.op_range)
+    if bench.settings.equation.signals == "engineering" and None in ranges:
+        yield f"{card} computes in engineering units, and not all ranges were given: spans not given are taken as 100"
+    yield from _left(bench, cut, card)
+
+
+def _what_starts(bench: Bench, way: Way, card: str) -> str:
+    if bench.increments:
+        return f"{card} adds increments to the last output, and makes none in the first automatic scan: there is nothing to preset"
+    if bench.is_bare and way.integral is None and (bench.a.start != "load-output" or not bench.a.keeps_integral):
+        return f"{card} has no integral action here: its output is P, D and a bias, whatever it was before"
+    return f"at the transfer {card} {STARTS[bench.a.start]}"
+
+
+def _evidence(bench: Bench, path: str) -> Evidence | None:
+    """Return what a field of the card rests on; ``None`` where the card leaves the field out."""
+    return next((s.evidence for s in bench.settings.variant.statements() if s.path == path), None)
+
+
+def _start_evidence(bench: Bench) -> Iterator[str]:
+    """Yield how sure the card is of its transfer, where it is not stated."""
+    found = _evidence(bench, "transfer.start")
+    if found is not None and found.status in (Status.ASSUMED, Status.INFERRED):
+        yield f"that is {found.status.value}, not stated: {found.note}"
+
+
+def _preset(bench: Bench, way: Way, card: str) -> Iterator[str]:
+    """Yield whether the card states that what the plan sets can be set (``transfer.preset``)."""
+    found = _evidence(bench, "transfer.preset")
+    where = "" if found is None else f"{found.status.value}: {found.at or found.note}"
+    if way.load is not None:
+        yield f"{card} can be given another value to load than its output ({where})"
+    elif way.integral is None:
+        if bench.preset == "none" and _detour(bench, way):
+            yield f"{card} does not state that anything but its output can be loaded, so the setpoint is moved instead"
+    elif bench.preset == "integral":
+        yield f"the integral of {card} can be set ({where})"
+    elif bench.preset == "initial":
+        yield (
+            f"the integral of {card} can be set for its first scan of all, not later ({where}); its filters and differences then "
+            "begin with that scan as well, and what they add comes on top"
+        )
+    else:
+        yield f"{card} does not state where its integral is set; where that cannot be done, the output moves as without the plan"
+
+
+def _detour(bench: Bench, way: Way) -> bool:
+    """Tell whether the setpoint is moved because the integral is loaded with the output."""
+    loads = bench.a.start == "load-output" and (bench.a.ki != 0 or bench.a.keeps_integral)
+    return loads and not bench.a.sp_tracks and way.sp != bench.sp
+
+
+def _left(bench: Bench, cut: Cut, card: str) -> Iterator[str]:
+    """Yield why the output moves all the same."""
+    if is_none(bench, cut):
+        return
+    bump = bench.out.percent(cut.bump)
+    if bench.is_bare and not bench.a.keeps_integral:
+        yield f"a bump of {bump:.6g} % of span remains: without integral action {card} keeps nothing that would hold the output; " \
+            f"a constant of {-bench.out.move(cut.bump):.6g} {bench.out.unit} added behind it would"  # fmt: skip
+    else:
+        yield f"a bump of {bump:.6g} % of span remains: the output limits, the limits of the integral or the setpoint weights of " \
+            f"{card} leave no room for what the output needs"  # fmt: skip
