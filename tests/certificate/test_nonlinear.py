@@ -62,7 +62,7 @@ def test_an_integral_without_windup_protection_comes_back_when_arithmetic_says(h
     # back-calculation holds the integral at 100, so that P of -64 leads away at once; float32 may round to the next scan
     assert found.figures[STAYS] == pytest.approx((0.0, stays), abs=h if h < 0.1 else 1e-9)
     assert "generic/standard (back-calculation, Tt = 60 s) leaves it at once, iec/61131-3-pid (none) leaves it after" in found.text
-    assert "after an error of 32 % for 120 s" in found.text
+    assert "when an error of 32 % for 120 s" in found.text
 
 
 def test_less_than_a_scan_is_no_difference() -> None:

@@ -10,6 +10,8 @@ from typing import Any, Final, Literal
 from pidemu.plain import json_safe
 
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
+RANK: Final = {"exact": 0, "exact-feedback": 1, "approximate": 2, "refused": 3}
+"""Verdicts, the best first."""
 
 EXACT: Final = 1e-9
 """Largest relative deviation that counts as none: rounding, many times over."""

@@ -165,8 +165,8 @@ def _windup_words(names: list[str], trial: Plan, done: tuple[Trial, Trial]) -> s
     left = [_leaves(t, 3 * trial.time) for t in done]
     each = f"{names[0]} {left[0]}, {names[1]} {left[1]}" if left[0] != left[1] else f"{names[0]} as well as {names[1]} {left[0]}"
     return (
-        f"after {course} towards an output limit, and the error turning, {each}; once it has been as large the other way for "
-        f"{3 * trial.time:.4g} s and is back at zero, {outputs}"
+        f"at an output limit the integral behaves differently: when {course} has driven it there and the error turns, {each}; "
+        f"after {3 * trial.time:.4g} s of as much the other way, with the error back at zero, {outputs}"
     )
 
 

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 from pidemu.card.load import Card
 from pidemu.card.models import Equation
-from pidemu.certificate.models import Certificate, Verdict
+from pidemu.certificate.models import RANK, Certificate, Verdict
 from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.solve import RANK, Solver
+from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import is_computed
 from pidemu.errors import PidemuError
 from pidemu.settings import Settings

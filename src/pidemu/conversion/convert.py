@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
@@ -30,6 +30,9 @@ from pidemu.units import Role, is_reciprocal, parse_unit
 if TYPE_CHECKING:
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
+
+
+_SCAN_RULES: Final = ("integral.rule", "derivative.rule", "derivative.filter.rule")
 
 
 @dataclass(frozen=True)
@@ -130,9 +133,11 @@ class Conversion:
 
     @property
     def law_assumptions(self) -> tuple[str, ...]:
-        """Those of `assumptions` that the figures of the continuous law rest on."""
-        found = [f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law]
-        return tuple(dict.fromkeys(found))
+        """Those of `assumptions` that the settings rest on: what makes the law and, where these make up for scans, scan rules."""
+        cost = self.certificate.scan_cost
+        rules = _SCAN_RULES if cost is not None and cost.compensated else ()
+        found = [(s, a) for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law or a.path in rules]
+        return tuple(dict.fromkeys(f"{s.card.id}: {a}" for s, a in found))
 
     @property
     def inferences(self) -> tuple[str, ...]:
@@ -243,6 +248,11 @@ def convert(
     ('exact', 2.6667, 20.0, 3.75)
     """
     aim = read_aim(match)
+    if process is None and aim.frequency is None and aim.match in ("frequency", "loop"):
+        other = " or a frequency, frequency:0.02rad/s" if aim.match == "frequency" else ""
+        raise SettingError(
+            f"the match '{aim.match}' needs the process{other}; give process=, or --process gain=...,lag=...,delay=..."
+        )
     card = target if isinstance(target, Card) else load_card(target)
     _refuse_recursions(source, card)
     factor = _rescaling(source, pv_range, op_range)
@@ -348,7 +358,7 @@ def _shared(source: Settings, target: Card) -> dict[str, object]:
 def _textbook(solver: Solver) -> Textbook:
     """Return what the textbook rule gives, with its figures."""
     try:
-        book = solver.textbook()
+        book = solver.forms.textbook()
         return Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
         return Textbook(None, None, str(error))

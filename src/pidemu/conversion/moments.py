@@ -99,7 +99,11 @@ def sizes(moments: Sequence[float]) -> tuple[float, float, float]:
     """Return what each of three moments is measured by: itself, or what the others make of it over one time."""
     m0, m1, m2 = moments
     time = abs(m1 / m0) if m0 and m1 else abs(m2 / m1) if m1 and m2 else 1.0
-    return abs(m0) or abs(m1) / time or abs(m2) / time**2, abs(m1) or abs(m0) * time, abs(m2) or abs(m1) * time or abs(m0) * time**2
+    return (
+        abs(m0) or abs(m1) / time or abs(m2) / time**2,
+        abs(m1) or abs(m0) * time or abs(m2) / time,
+        abs(m2) or abs(m1) * time or abs(m0) * time**2,
+    )
 
 
 def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence[float]:

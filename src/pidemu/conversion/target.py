@@ -233,7 +233,8 @@ class Target:
         values: dict[str, object] = {**self.given, **extra}
         for name, setting in self.variant.equation.settings.items():
             if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
-                values[name] = _placeholder(setting)
+                undefined = setting.sets == "derivative" and self.form is Form.SERIES and not self.has_proportional
+                values[name] = (*off_values(setting), 0.0)[0] if undefined else _placeholder(setting)
         return self.card.settings({**self.variant.chosen, **values, **self.ranges})
 
     def settings(self, n: Numbers) -> Settings:
@@ -344,15 +345,19 @@ class Target:
             raise SettingError(f"{f.setting} would have to be infinite: this target always filters its derivative")
         return {f.setting: self._in_reach(f.setting, setting, base / Tf)}
 
-    def algorithm_of(self, n: Numbers) -> Algorithm:
-        """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
-        f, scale = self.filter, self.multiplier if n.multiplier is None else n.multiplier
+    def filter_base(self, n: Numbers) -> Any:
+        """Return the derivative time that the filter's ratio or gain refers to [s], for numbers that may be arrays."""
+        scale = self.multiplier if n.multiplier is None else n.multiplier
         parallel = self.form is Form.PARALLEL
         scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
-        time = n.kd / scale if parallel else n.kd / n.K if self.has_proportional or not _is_zero(n.K) else 0.0
-        base = time / (1 + time * n.ki / n.K) if f.effective and not _is_zero(time) else time
+        time = n.kd / scale if parallel else 0.0 if _is_zero(n.K) else n.kd / n.K
+        return time / (1 + time * n.ki / n.K) if self.filter.effective and not _is_zero(time) else time
+
+    def algorithm_of(self, n: Numbers) -> Algorithm:
+        """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
+        f, base = self.filter, self.filter_base(n)
         Tf = n.Tf if n.Tf is not None else f.time if f.kind == "time" else f.ratio * base
-        if f.kind != "time" and isinstance(base, float) and base == 0:
+        if f.kind != "time" and _is_zero(base):
             Tf = 0.0
         kd = n.kd - n.K * Tf if f.lead_lag else n.kd
         b, c = (own if x is None else x for own, x in ((self.shape.b, n.b), (self.shape.c, n.c)))

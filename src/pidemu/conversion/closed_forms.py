@@ -1,0 +1,239 @@
+"""Settings of a target by the closed forms: which of them applies, in what order, with what filter and which setpoint weights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.base import Form
+from pidemu.certificate.linear import certify
+from pidemu.certificate.models import EXACT, RANK
+from pidemu.conversion import match as closed
+from pidemu.conversion.aim import Match
+from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.moments import Problem, Way, meet, sizes
+from pidemu.conversion.target import Numbers, Target, TargetFilter
+from pidemu.errors import SettingError
+from pidemu.law import Law
+from pidemu.settings import Settings, limits
+from pidemu.units import Role
+
+
+class ClosedForms:
+    """A source and a target, matched by their continuous laws.
+
+    Parameters
+    ----------
+    source : Settings
+        What to convert.
+    target : Target
+        What to convert to; a match fixes its filter.
+    factor : float
+        What the source's gain is multiplied by for new signal ranges.
+    """
+
+    def __init__(self, source: Settings, target: Target, factor: float) -> None:
+        self.source = source
+        self.target = target
+        self.factor = factor
+        algorithm = source.algorithm()
+        self.law = Law(algorithm)
+        self.scaled = Law(scaled(algorithm, factor))
+        self.original_filter = target.filter
+        gain = source.by_role(Role.GAIN)
+        if gain is not None and not algorithm.kp:
+            target.idle_gain = gain.canonical or 1.0
+
+    def textbook(self) -> Settings:
+        """Return what the rule in manuals gives.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            The rule has no answer, or the target no such settings.
+        """
+        return self.target.settings(self.textbook_numbers())
+
+    def textbook_numbers(self) -> Numbers:
+        """Return what the rule in manuals gives, without choice of setpoint weights; raises as `textbook`."""
+        closed.check_terms(self.scaled.algorithm, self.target)
+        return closed.textbook(self.scaled.algorithm, self._dial_kd(), self.target)
+
+    def _dial_kd(self) -> float:
+        """Return ``K Td`` by the source's dial: its own time, not the strength left by a lead-lag [s]."""
+        a, time = self.scaled.algorithm, self.source.by_role(Role.DERIVATIVE)
+        return a.kp * time.canonical if a.series and a.kd and time is not None else a.kd
+
+    def solve(self, match: Match | None) -> tuple[Settings, Match]:
+        """Return the target's settings and how they were found: by the source's own numbers, exactly, or at low frequencies.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            There are none, or they leave the target's ranges.
+        """
+        own = self._own()
+        if own is not None and (own[0] == "exact" and match != "low-frequency"):
+            return own[1], "exact"
+        try:
+            return self._matches(match)
+        except (NoMatchError, SettingError):
+            if own is None:
+                raise
+            return own[1], "exact"
+
+    def _own(self) -> tuple[str, Settings] | None:
+        """Return verdict and settings for the source's own numbers, where these are an exact match of a target of its form."""
+        equation, a = self.source.equation, self.scaled.algorithm
+        gain = self.source.by_role(Role.GAIN)
+        if equation.form is not self.target.form:
+            return None
+        K = a.kp or (gain.canonical if gain is not None else 0.0)
+        with suppress(SettingError):
+            settings = self.weighted(Numbers(K, a.ki, self._dial_kd(), a.Tf if self.target.filter.free else None))
+            verdict = self._continuous_verdict(settings)
+            return None if verdict == "approximate" else (verdict, settings)
+        return None
+
+    def _continuous_verdict(self, settings: Settings) -> str:
+        return certify(self.law, settings.law(), None, self.factor).verdict
+
+    def _matches(self, match: Match | None) -> tuple[Settings, Match]:
+        why: NoMatchError | SettingError | None = None
+        if match != "low-frequency":
+            try:
+                return self._best(closed.exact(self.scaled, self.target)), "exact"
+            except (NoMatchError, SettingError) as error:
+                why = error
+                if match == "exact" and self.target.filter.free:
+                    raise
+        try:
+            settings = self._low_frequency()
+        except (NoMatchError, SettingError) as error:
+            raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
+        how: Match = "exact" if certify(self.law, settings.law(), None, self.factor).feedback.is_exact else "low-frequency"
+        if match == "exact" and how != "exact":
+            raise NoMatchError("its filter is fixed, and no settings give the same law")
+        return settings, how
+
+    def _low_frequency(self) -> Settings:
+        """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""
+        delivered = replace(self.target.filter, free=False)
+        if self.target.filter.free:
+            self.target.filter = self.target.filter.nearest_to(*self._wanted_filter())
+            with suppress(NoMatchError, SettingError):
+                return self._with_the_moments(self._best(self._matched(self.scaled.moments(), self.target.filter)))
+        self.target.filter = delivered
+        return self._with_the_moments(self._best(self._matched(self.scaled.moments(), delivered)))
+
+    def _with_the_moments(self, settings: Settings) -> Settings:
+        """Return the settings or, behind a filter that no closed form knows, such that have the moments."""
+        wanted, found = self.scaled.moments(), settings.law().moments()
+        if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
+            return settings
+        return self.through(lambda problem, _: meet(problem), settings)
+
+    def _matched(self, moments: Sequence[float], filt: TargetFilter) -> Iterable[Numbers]:
+        """Return the solutions of the low-frequency match, with a filter that was free set to the value it was fixed at."""
+        for numbers in closed.low_frequency(moments, self.target, filt):
+            chosen = filt.setting is not None and filt.setting not in self.target.given
+            yield replace(numbers, Tf=self._time_of(numbers)) if chosen else numbers
+
+    def through(
+        self, solve: Way, start: Settings, at_scan: tuple[Law, float] | None = None, *, derivative: bool = True
+    ) -> Settings:
+        """Return settings found by way of their moments.
+
+        Parameters
+        ----------
+        solve : callable
+            What finds the moments.
+        start : Settings
+            Settings whose filter is taken.
+        at_scan : tuple of Law and float, optional
+            The source's law at its scan interval and the target's interval [s], where these count.
+        derivative : bool
+            Without it the target gets no derivative action, whatever the second moment asks for.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            There are none, or they leave the target's ranges.
+        """
+        filt = self.target.filter
+        if filt.setting is not None:
+            filt = replace(filt, free=False, value=start[filt.setting].canonical)
+        self.target.filter = filt
+
+        def numbers(moments: Sequence[float]) -> Numbers:
+            if derivative:
+                return next(iter(self._matched(moments, self.target.filter)))
+            return replace(next(iter(self._matched((*moments[:2], 0.0), self.target.filter))), kd=0.0)
+
+        wanted, scan = at_scan or (self.law, None)
+        problem = Problem(Law(scaled(wanted.algorithm, self.factor), wanted.scan), self.target, numbers, scan)
+        return self.weighted(numbers(solve(problem, self.scaled.moments())), problem)
+
+    def _best(self, solutions: Iterable[Numbers]) -> Settings:
+        """Return the settings of the first solution, or of a later one whose law is exactly the source's.
+
+        Raises
+        ------
+        SettingError
+            None of these lies within the target's ranges; the first one's reason.
+        """
+        solutions = tuple(solutions)
+        if len(solutions) == 1:
+            return self.weighted(solutions[0])
+        found: list[tuple[int, Settings]] = []
+        refused: SettingError | None = None
+        for i, numbers in enumerate(solutions):
+            try:
+                settings = self.weighted(numbers)
+            except SettingError as error:
+                refused = refused or error
+                continue
+            rank = RANK[self._continuous_verdict(settings)]
+            if i == 0 or rank < RANK["approximate"]:
+                found.append((rank, settings))
+        if not found:
+            raise refused or NoMatchError("the numbers leave the range of floating point")
+        return min(found, key=lambda pair: pair[0])[1]
+
+    def _time_of(self, numbers: Numbers) -> float:
+        """Return the filter time that goes with the numbers when the filter is fixed [s]."""
+        return float(self.target.algorithm_of(replace(numbers, Tf=None)).Tf)
+
+    def _wanted_filter(self) -> tuple[float, float]:
+        """Return the filter time that the next moment asks for, and the derivative time it goes with [s]."""
+        _, m1, m2, m3 = self.scaled.expansion(4)
+        if m2 == 0:
+            return 0.0, 0.0
+        plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"
+        per = 1.0 if plain else m1 or self.target.idle_gain
+        return max(0.0, -m3 / m2), m2 / per
+
+    def weighted(self, numbers: Numbers, problem: Problem | None = None) -> Settings:
+        """Return settings of the target, with the setpoint weights that keep the setpoint path, as far as their ranges allow."""
+        settings = self.target.settings(numbers)
+        scan = problem.scan if problem is not None else None
+        wanted = self.scaled if problem is None else problem.wanted
+        b, c = closed.weights(wanted, self.target, settings.algorithm(scan=scan), scan)
+        if b is None and c is None:
+            return settings
+        b, c = self._in_range(Role.PROPORTIONAL_WEIGHT, b), self._in_range(Role.DERIVATIVE_WEIGHT, c)
+        return self.target.settings(replace(numbers, b=b, c=c))
+
+    def _in_range(self, role: Role, weight: float | None) -> float | None:
+        dial = self.target.dial(role)
+        if dial is None or weight is None:
+            return None
+        low, high = limits(dial[1])
+        return min(max(weight, low), high)
+
+
+def scaled(a: Algorithm, factor: float) -> Algorithm:
+    """Return the algorithm with all three gains multiplied."""
+    return a if factor == 1 else replace(a, kp=a.kp * factor, ki=a.ki * factor, kd=a.kd * factor)
