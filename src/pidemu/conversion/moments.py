@@ -168,7 +168,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
     (low, high), _ = bands(problem.wanted if problem.wanted.scan is None else Law(problem.wanted.algorithm), problem.scan, process)
     w = np.geomspace(low, high if problem.scan is None else min(2 * high, math.pi / problem.scan), _POINTS)
     P = process.response(w)
-    sign = math.copysign(1.0, process.gain * next(m for m in start if m))
+    sign = math.copysign(1.0, process.feedback_sign * next(m for m in start if m))
     C = sign * problem.wanted.held(w)
     wanted = P / (1 + P * C)
     weight = 1 / np.sqrt(w)  # 1/w of the step, and dw = w dlog(w)
