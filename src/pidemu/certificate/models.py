@@ -284,11 +284,14 @@ class Certificate:
     @property
     def verdict(self) -> Verdict:
         """``exact``, ``exact-feedback`` or ``approximate``: laws at the scans, and emulations, count where there are any."""
-        emulated = self.scan_by_scan
-        if not self.headline.is_exact or not (emulated is None or emulated.is_exact_on_measurement):
+        emulated, aspects = self.scan_by_scan, {d.aspect for d in self.nonlinear}
+        bent = not aspects.isdisjoint(
+            ("error", "output")
+        )  # a deadband, a rate limit: signals that are large or small enough show it
+        if bent or not self.headline.is_exact or not (emulated is None or emulated.is_exact_on_measurement):
             return "approximate"
         same = (self.setpoint_at_scan or self.setpoint).is_exact and (emulated is None or emulated.is_exact)
-        return "exact" if same else "exact-feedback"
+        return "exact" if same and "setpoint" not in aspects else "exact-feedback"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""

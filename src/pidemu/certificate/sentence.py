@@ -78,6 +78,8 @@ def _emulated(c: Certificate) -> str:
     e = c.scan_by_scan
     if e is None:
         return "they could not be run to prove it"
+    if e.is_exact_on_measurement:
+        return "one has a nonlinear option that the other has not: see what to watch for"
     return (
         f"run scan by scan, with the setpoint at rest, they differ by up to {_percent(e.on_measurement / 100)} of span on test "
         f"signals that move the output by {e.size:.3g} %, because of scan rule, arithmetic or a nonlinear option"

@@ -20,6 +20,9 @@ from pidemu.law import Law
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
+_ROUNDING = 1e-6
+"""Deviation that rounding may make of an exact match where its numbers nearly cancel."""
+
 
 class ClosedForms:
     """A source and a target, matched by their continuous laws.
@@ -104,7 +107,7 @@ class ClosedForms:
         why: NoMatchError | SettingError | None = None
         if match != "low-frequency":
             try:
-                return self._best(closed.exact(self.scaled, self.target)), "exact"
+                return self._proven(self._best(closed.exact(self.scaled, self.target))), "exact"
             except (NoMatchError, SettingError) as error:
                 why = error
                 if match == "exact" and self.target.filter.free:
@@ -117,6 +120,12 @@ class ClosedForms:
         if match == "exact" and how != "exact":
             raise NoMatchError("its filter is fixed, and no settings give the same law")
         return settings, how
+
+    def _proven(self, settings: Settings) -> Settings:
+        """Refuse an exact match that is none: whatever the card says of its terms, the law decides."""
+        if certify(self.law, settings.law(), None, self.factor).feedback.full_band.max_deviation > _ROUNDING:
+            raise NoMatchError("no settings give the same law")
+        return settings
 
     def _low_frequency(self) -> Settings:
         """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""

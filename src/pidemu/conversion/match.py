@@ -83,6 +83,10 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     wanted_d2 = d1 * d1 / 2 if shape.filter_order == 2 and shape.filter_on == "measurement" else 0.0
     if abs(d2 - wanted_d2) > _ROUNDING * max(d1 * d1, abs(d2)):
         raise NoMatchError("the two filters are of different order")
+    if target.form is Form.SERIES and not target.has_proportional:
+        if n1 or n2:
+            raise NoMatchError("the target has no proportional term")
+        return (_without_proportional(n0, 0.0, target, target.idle_gain),)
     if shape.filter_on != "term":
         return tuple(_through_signal_filter(n0, n1, n2, d1, target))
     if shape.series:
