@@ -122,7 +122,7 @@ class TestFrequency:
         "process",
         [
             pidemu.Process.from_lags(1.2, lags=[10, 3], delay=2),
-            pidemu.Process.from_lags(-0.7, lags=[25], delay=6),
+            pidemu.Process.from_lags(-1.4, lags=[25], delay=6),
             pidemu.Process.from_lags(0.03, integrators=1, lags=[4], delay=3),
         ],
         ids=str,
@@ -148,8 +148,13 @@ class TestFrequency:
     def test_a_frequency_beyond_nyquist_is_refused(self) -> None:
         with pytest.raises(ConversionRefusedError, match=r"4 rad/s is beyond half the scan rate; match at a lower frequency$"):
             convert(standard(K=2, Ti=40, Td=8, Tf=1), "generic/parallel", "frequency:4rad/s", scan=(0.5, 1.0), given={"Tf": 2.0})
-        found = convert(standard(K=2, Ti=40, Td=8, Tf=1), "generic/parallel", "frequency:3rad/s", scan=(0.5, 1.0), given={"Tf": 2})
+        found = convert(standard(K=2, Ti=40, Td=8, Tf=1), "generic/parallel", "frequency:3rad/s", scan=1.0, given={"Tf": 1.2})
         assert found.match == "frequency"
+
+    def test_a_crossover_beyond_the_nyquist_frequency_of_the_target_is_refused(self) -> None:
+        source, process = standard(K=8, Ti=20, Td=2, Tf=0.2), pidemu.Process.from_lags(1.2, lags=[10], delay=0.3)
+        with pytest.raises(ConversionRefusedError, match=r"the source's crossover, 7\.5\d* rad/s, is beyond half the scan rate"):
+            convert(source, "generic/parallel", "frequency", given={"Tf": 0.5}, process=process, scan=(0.1, 5.0))
 
     def test_a_loop_without_a_crossover_is_refused(self) -> None:
         pd = standard(K=0.5, Ti=math.inf, Td=2, Tf=1)
@@ -193,7 +198,10 @@ class Loop:
         return pidemu.Process(self.gain, poles, delay=self.delay)
 
     def measurement(self, kp: float, ki: float, kd: float, Tf: float) -> Floats:
-        """States: the lags in a row, the integral of the error, the filtered measurement. The delayed output is straight between steps."""
+        """Return the response; the states are the lags in a row, the integral of the error and the filtered measurement.
+
+        The delayed output is taken as straight between two steps.
+        """
         n = len(self.lags)
         A, B = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
         for i, lag in enumerate(self.lags):
@@ -284,7 +292,9 @@ class TestLoop:
 
     def test_the_same_gain_under_another_sign_of_the_process_is_found(self) -> None:
         both = [
-            convert(series(**LOOPS[name][1]), "generic/parallel", "loop", given={"Tf": 2.0}, process=LOOPS[name][0].process).settings
+            convert(
+                series(**LOOPS[name][1]), "generic/parallel", "loop", given={"Tf": 2.0}, process=LOOPS[name][0].process
+            ).settings
             for name in ("lags", "negative gain")
         ]
         assert both[0]["kp"].value == pytest.approx(both[1]["kp"].value, rel=1e-9)

@@ -165,6 +165,8 @@ class Solver:
         found = crossover(lambda w: self.factor * wanted.held(w), self.process, None if self.scans is None else self.scans[0])
         if found is None:
             raise SettingError("the source's loop has no gain crossover with this process; give the frequency")
+        if self.scans is not None and found >= math.pi / max(self.scans):
+            raise SettingError(f"the source's crossover, {found:g} rad/s, is beyond half the scan rate; match at a lower frequency")
         return found
 
     def closed(self, match: Match | None) -> tuple[Settings, Match]:
