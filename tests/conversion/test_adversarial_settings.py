@@ -18,14 +18,12 @@ from tests.conversion.test_options import CARDS
 from tests.helpers import WIDE
 
 SIGNED = [
-    ("simple-pid/simple-pid", {"Kp": 2, "Ki": 0.05}),
     ("simple-pid/simple-pid", {"Kp": -2, "Ki": -0.05}),
     ("advanced-pid/advanced-pid", {"Kp": -2, "Ki": -0.05, "Kd": 0, "Tf": 0}),
     ("simple-pid/simple-pid", {"Kp": 0, "Ki": -0.05}),
     ("epics/epid", {"KP": -2, "KI": 0.025}),
     ("iec/61131-3-pid", {"KP": 2, "TR": 40}),  # its own error is PV - SP
     ("iec/61131-3-pid", {"KP": -2, "TR": 40}),
-    ("king/velocity", {"Kc": 2, "Ti": 0.5}),
     ("yokogawa/fieldbus-pid", {"GAIN": 2, "RESET": 40}),
     ("fisher/provox", {"GAIN": 2, "RESET": 4}),
 ]
