@@ -70,7 +70,7 @@ def apart(conversion: Conversion, low: float, high: float) -> float:
 CROSSED = [
     (a, b)
     for a, b in itertools.product([*PLAIN, *SERIES], repeat=2)
-    if a != b and a != "generic/parallel" and not (a in PLAIN and b in PLAIN)
+    if a not in (b, "generic/parallel") and not (a in PLAIN and b in PLAIN)
 ]
 """Between standard and parallel there is nothing to factor, and into series they are the same source."""
 
