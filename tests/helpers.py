@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -108,22 +107,6 @@ def dials_of(draw: st.DrawFn, card_id: str) -> dict[str, object]:
 def settings_of(data: st.DataObject, card: Card) -> Settings:
     """Draw valid settings of a card; a failure prints the dials, not the whole card."""
     return card.settings(data.draw(dials_of(card.id)))
-
-
-def linear(a: Algorithm) -> Algorithm:
-    """Return the algorithm without what the linear law leaves out."""
-    return replace(
-        a,
-        precision="float64",
-        shape=None,
-        integral_deadband=None,
-        integral_limits=None,
-        sp_rate=math.inf,
-        output_rate=math.inf,
-        output_deadband=0.0,
-        resolution=0.0,
-        bias=0.0,
-    )
 
 
 @st.composite

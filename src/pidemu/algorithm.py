@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pidemu.card.base import Rule
@@ -321,6 +321,22 @@ class Algorithm:
         if self.ki and self.kp and abs(self.kp / self.ki) < h:
             found.append(f"the integral time of {abs(self.kp / self.ki):.3g} s is less")
         return found
+
+    @property
+    def linear(self) -> Algorithm:
+        """The algorithm without what the linear law leaves out."""
+        return replace(
+            self,
+            precision="float64",
+            shape=None,
+            integral_deadband=None,
+            integral_limits=None,
+            sp_rate=math.inf,
+            output_rate=math.inf,
+            output_deadband=0.0,
+            resolution=0.0,
+            bias=0.0,
+        )
 
     @property
     def beyond_the_law(self) -> list[str]:

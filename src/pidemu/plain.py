@@ -1,4 +1,4 @@
-"""Plain values for JSON."""
+"""Plain values: for JSON, and numbers in words."""
 
 from __future__ import annotations
 
@@ -13,3 +13,9 @@ def json_safe(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [json_safe(v) for v in value]
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def exactly(x: float) -> str:
+    """Return a number that reads back as the same one."""
+    short = f"{x:.12g}"
+    return short if float(short) == x else repr(x)

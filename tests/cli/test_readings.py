@@ -16,9 +16,9 @@ def refused(
     capsys: pytest.CaptureFixture[str], found: tuple[pidemu.Reading, ...], to: str = "emerson/deltav", **more: Any
 ) -> tuple[int, str, str]:
     """Exit status and both streams."""
-    as_json, also = more.pop("as_json", False), more.pop("also", ())
+    as_json = more.pop("as_json", False)
     with pytest.raises(SystemExit) as end:
-        refuse_to_choose(found, pidemu.load_card(to), more, to=to, also=also, as_json=as_json)
+        refuse_to_choose(found, pidemu.load_card(to), more, to=to, as_json=as_json)
     streams = capsys.readouterr()
     return int(str(end.value.code)), streams.out, streams.err
 
@@ -100,10 +100,10 @@ def test_descriptions_that_amount_to_the_same_stand_together(capsys: pytest.Capt
     assert lines[at + 1] == f"   or {found[0].alike[0]}"
 
 
-def test_further_words_of_the_command_line_and_ranges_are_passed_on(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_else_was_asked_for_is_passed_on(capsys: pytest.CaptureFixture[str]) -> None:
     found = pidemu.readings("fisher/provox", GAIN=2, RESET=0.75, pv_range=(0, 200), op_range=(0, 100))
-    err = refused(capsys, found, pv_range=(-50.0, 150.0), also=("--process", "my loop.yaml"))[2]
+    err = refused(capsys, found, pv_range=(-50.0, 150.0), process=pidemu.Process.from_lags(2, [10]), compensate=False)[2]
     assert err.splitlines()[-1] == (
         '  2. pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --pv-range=0,200 --op-range=0,100 '
-        '--to emerson/deltav --to-pv-range=-50,150 --process "my loop.yaml"'
+        "--to emerson/deltav --to-pv-range=-50,150 --process gain=2,lag=10 --no-compensation"
     )

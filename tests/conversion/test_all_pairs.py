@@ -17,7 +17,7 @@ from pidemu.errors import ConversionRefusedError, ScanError
 from pidemu.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, settings_that_act
 from tests.conversion.test_options import CARDS, SOURCES
-from tests.helpers import WIDE, Floats, linear
+from tests.helpers import WIDE, Floats
 
 PAIRS = list(itertools.product(CARDS, CARDS))
 SCANS = st.none() | st.floats(0.2, 3).map(lambda h: (h, h)) | st.tuples(st.floats(0.1, 2), st.floats(0.1, 2))
@@ -126,7 +126,7 @@ def shown(s: Settings, w: float, h: float) -> complex:
 def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_the_band(data: st.DataObject, place: float) -> None:
     source, target = drawn(data)
     a = source.algorithm()
-    assume(linear(a) == a)
+    assume(a.linear == a)
     band = bands(source.law(), None)[0]
     w = band[0] ** (1 - place) * band[1] ** place
     h = 2 * math.pi / (w * PER_PERIOD)
@@ -134,7 +134,7 @@ def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_
     try:
         conversion = convert(source, target, scan=h, emulate=False)
         found = conversion.settings.algorithm()
-        assume(linear(found) == found and found.Tf < 2 * PER_PERIOD * h)
+        assume(found.linear == found and found.Tf < 2 * PER_PERIOD * h)
         ratio = shown(conversion.settings, w, h) / (conversion.factor * shown(source, w, h))
     except (ConversionRefusedError, ScanError):
         assume(False)

@@ -24,7 +24,7 @@ from pidemu.scan.build import build
 from pidemu.scan.program import Binary, Expr, Name, Number, Operator, Program, Select
 from pidemu.settings import limits
 from pidemu.targets.python import compiled, render, source
-from tests.helpers import WIDE, Floats, linear, outputs, scans_of, settings_of
+from tests.helpers import WIDE, Floats, outputs, scans_of, settings_of
 
 PATHS: tuple[Literal["feedback"], Literal["setpoint"]] = ("feedback", "setpoint")
 FILTERS: tuple[tuple[Place, Literal[1, 2]], ...] = (("term", 1), ("measurement", 1), ("measurement", 2), ("output", 1))
@@ -131,7 +131,7 @@ def assert_impulse(expected: Floats, actual: Floats) -> None:
 def test_the_impulse_response_of_every_cards_program_is_that_of_its_law(name: str, data: st.DataObject) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
     h = data.draw(scans_of(chosen.algorithm()))
-    program = build(linear(chosen.algorithm(own_units=True, scan=h)), h, limits=WIDE)
+    program = build(chosen.algorithm(own_units=True, scan=h).linear, h, limits=WIDE)
     for path in PATHS:
         assert_impulse(chosen.law(scan=h).impulse(40, path), impulse(program, path, 40))
 
@@ -195,7 +195,7 @@ def test_in_its_own_units_every_card_is_its_percent_law_rescaled_by_the_spans(na
     given: dict[str, object] = {n: v.value for n, v in default.items()} | dict(default.options)
     chosen = card.settings(given, pv_range=(-50, 150), op_range=(0, 50))
     h = data.draw(scans_of(chosen.algorithm()))
-    program = build(linear(chosen.algorithm(own_units=True, scan=h)), h, limits=WIDE)
+    program = build(chosen.algorithm(own_units=True, scan=h).linear, h, limits=WIDE)
     engineering = chosen.equation.signals == "engineering"
     percent = 200 / 50 if engineering else 1.0  # output percent per PV percent, from output units per PV unit
     for path in PATHS:
@@ -216,7 +216,7 @@ def test_positional_and_velocity_agree_in_the_linear_range(a: Algorithm, seed: i
 @on_every_card
 @given(data=st.data(), seed=seeds)
 def test_every_card_agrees_with_its_other_implementation_in_the_linear_range(name: str, data: st.DataObject, seed: int) -> None:
-    a = linear(settings_of(data, pidemu.load_card(name)).algorithm())
+    a = settings_of(data, pidemu.load_card(name)).algorithm().linear
     if a.dahlin is not None:
         return  # it has one implementation only
     a = replace(a, zero_power_up=False, start="bumpless", first_scan_holds=False, derivative_from_zero=False)
@@ -277,7 +277,7 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
     if a.start == "load-output" or (a.ki == 0 and not a.velocity and a.dahlin is None):  # bumped by P + D, as in the field
         x = record(seed, modes=True)
         a = replace(
-            linear(a), kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_integral=True, holds="ki e", manual_output="operator"
+            a.linear, kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_integral=True, holds="ki e", manual_output="operator"
         )
         u = run(build(a, h, initial_output=30.0), x)
         assert all(u[n] == u[n - 1] for n in starts_in_automatic(x))
@@ -314,7 +314,7 @@ def test_no_windup_scheme_moves_the_integral_of_a_proportional_controller(windup
 @given(data=st.data(), seed=seeds)
 def test_direct_action_is_reverse_action_on_mirrored_signals(name: str, data: st.DataObject, seed: int) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
-    a = linear(chosen.algorithm(own_units=True))  # whole numbers are rounded down, which has no mirror image
+    a = chosen.algorithm(own_units=True).linear  # whole numbers are rounded down, which has no mirror image
     if chosen.equation.action.fixed:
         a = replace(a, manual_output="operator")  # there is no direct action: the real one's output in manual has the gain's sign
     h = data.draw(scans_of(a))
@@ -328,7 +328,7 @@ def test_direct_action_is_reverse_action_on_mirrored_signals(name: str, data: st
 @given(data=st.data())
 def test_reverse_acting_means_that_the_output_falls_when_the_measurement_rises(name: str, data: st.DataObject) -> None:
     a = settings_of(data, pidemu.load_card(name)).algorithm()
-    a = replace(linear(a), kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd))  # a negative gain turns the action round
+    a = replace(a.linear, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd))  # a negative gain turns the action round
     first = impulse(build(a, data.draw(scans_of(a)), limits=WIDE), "feedback", 1)[0]
     late = a.integral_rule is Rule.FORWARD or a.ki == 0.0
     assert first > 0 or (a.kp == a.kd == 0.0 and late and first == 0)

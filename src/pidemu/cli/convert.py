@@ -129,8 +129,7 @@ def command(
 
         arguments["process"] = parse_process(process)
     if word is not None:
-        also = [*(["--process", process] if process else []), *(["--no-compensation"] if plain else [])]
-        source = _only_reading(word, {**given, **ranges}, goal, arguments, target, also, vendors, as_json)
+        source = _only_reading(word, {**given, **ranges}, goal, arguments, target, vendors, as_json)
     else:
         source = load_card(card or "", vendors).settings({**given, **ranges})
     try:
@@ -161,7 +160,6 @@ def _only_reading(
     goal: Card,
     arguments: dict[str, Any],
     to: str,
-    also: list[str],
     vendors: tuple[str, ...],
     as_json: bool,
 ) -> Settings:
@@ -171,7 +169,7 @@ def _only_reading(
 
     found = readings(word, given, vendors=vendors)
     if len(found) > 1:
-        refuse_to_choose(found, goal, arguments, to=to, also=also, as_json=as_json)
+        refuse_to_choose(found, goal, arguments, to=to, as_json=as_json)
     return found[0].settings
 
 

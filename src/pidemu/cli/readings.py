@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NoReturn
+from dataclasses import fields
+from typing import Any, NoReturn
 
 import click
 
@@ -12,12 +13,10 @@ from pidemu.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.card.load import Card
 from pidemu.cli.common import number, print_json
 from pidemu.conversion.convert import Conversion, convert
+from pidemu.conversion.request import Request
 from pidemu.errors import ConversionRefusedError
 from pidemu.plain import json_safe
 from pidemu.settings import Settings
-
-_AS_WORDS: Final = {"scan": "--scan", "pv_range": "--to-pv-range", "op_range": "--to-op-range"}
-_FLAGS: Final = {"round_dials": "--round", "allow_approximate": "--allow-approximate"}
 
 
 def refuse_to_choose(
@@ -26,7 +25,6 @@ def refuse_to_choose(
     arguments: Mapping[str, Any],
     *,
     to: str,
-    also: Sequence[str] = (),
     as_json: bool = False,
 ) -> NoReturn:
     """Print every reading with the result of its conversion, refuse to choose, and exit with status 1.
@@ -41,8 +39,6 @@ def refuse_to_choose(
         What else `convert` is to be given, by name.
     to : str
         The target as the user named it, for the commands that state a reading.
-    also : sequence of str
-        Further words for these commands: options of the command line that `arguments` does not tell.
     as_json : bool
         Print JSON on stdout, and the refusal alone on stderr.
 
@@ -57,7 +53,7 @@ def refuse_to_choose(
         "state it, as the command of each reading does"
     )
     click.echo(f"error: refused: {reason}", err=True)
-    commands = [f"pidemu convert {r.command} {command_line([*_target_words(to, arguments), *also])}" for r in found]
+    commands = [f"pidemu convert {r.command} {command_line(_target_words(to, arguments))}" for r in found]
     if as_json:
         _as_json(found, results, commands, reason)
     else:
@@ -121,12 +117,5 @@ def _how_far(far: Apart) -> str:
 
 def _target_words(to: str, arguments: Mapping[str, Any]) -> list[str]:
     """Return the target and what else was asked of the conversion as words of the command line."""
-    words = ["--to", to]
-    for name, value in {**(arguments.get("options") or {}), **(arguments.get("given") or {})}.items():
-        words += ["--set", f"{name}={value}"]
-    for name, flag in _AS_WORDS.items():
-        if arguments.get(name) is not None:
-            words.append(f"{flag}={','.join(f'{x:.15g}' for x in arguments[name])}")
-    if arguments.get("match"):
-        words += ["--match", arguments["match"]]
-    return words + [flag for name, flag in _FLAGS.items() if arguments.get(name)]
+    names = {f.name for f in fields(Request)}
+    return ["--to", to, *Request(**{n: x for n, x in arguments.items() if n in names and x is not None}).words()]

@@ -20,6 +20,7 @@ from pidemu.conversion.aim import Match, read_aim
 from pidemu.conversion.choices import Attempt, attempts
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.request import Request
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
@@ -82,6 +83,8 @@ class Conversion:
         Scan intervals of source and target [s].
     process : Process or None
         The process, where it was given.
+    request : Request
+        What was asked for.
     """
 
     source: Settings
@@ -96,6 +99,7 @@ class Conversion:
     factor: float = 1.0
     scan: tuple[float, float] | None = None
     process: Process | None = None
+    request: Request = field(default_factory=Request)
 
     @property
     def verdict(self) -> Verdict:
@@ -289,8 +293,12 @@ def convert(
     if round_dials and rounded:
         before = work.certify(exact_dials).feedback
         certificate = replace(certificate, dials=rounded, feedback_before_rounding=before)
+    request = Request(
+        options or {}, given or {}, scans, match, pv_range, op_range, process, compensate, allow_approximate, round_dials
+    )
+    book, chosen = _textbook(work), dict(best.changed)
     conversion = Conversion(
-        source, settings, how, certificate, _textbook(work), (), refusal, dict(best.changed), ranking, work.factor, scans, process
+        source, settings, how, certificate, book, (), refusal, chosen, ranking, work.factor, scans, process, request
     )
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if refusal and not allow_approximate:

@@ -118,7 +118,7 @@ def _tail(before: float, after: float) -> float:
 
 def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Iterator[float]:
     """Yield the integral of the absolute error per block of scans, after a load step of 1 % from rest [% s]."""
-    a = _linear(algorithm)
+    a = algorithm.linear
 
     def make(h: float, *, at_rest: bool = False) -> Program:
         return build(resting(a) if at_rest else a, h, limits=_WIDE)
@@ -135,22 +135,6 @@ def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Ite
             last = y
             plant.move(scan(state, 0.0, y, 1.0, nan) + _SMALL)
         yield total * h / _SMALL
-
-
-def _linear(a: Algorithm) -> Algorithm:
-    """Return the algorithm without what the linear law leaves out."""
-    return replace(
-        a,
-        precision="float64",
-        shape=None,
-        integral_deadband=None,
-        integral_limits=None,
-        sp_rate=math.inf,
-        output_rate=math.inf,
-        output_deadband=0.0,
-        resolution=0.0,
-        bias=0.0,
-    )
 
 
 def _as_continuous(a: Algorithm) -> Algorithm:

@@ -1,13 +1,17 @@
-"""Reading a process model from a line of text."""
+"""A process model as a line of text, read and written."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from pidemu.errors import ProcessError, UnitError, suggest
 from pidemu.loop.roots import count, poles_of, zeros_of
+from pidemu.plain import exactly
 from pidemu.units import Role, parse_quantity, to_canonical
+
+if TYPE_CHECKING:
+    from pidemu.loop.process import Process
 
 _NAMES: Final = ("gain", "lag", "lead", "integrators", "delay", "pole", "zero")
 
@@ -65,3 +69,37 @@ def _with_conjugates(name: str, values: Sequence[str]) -> list[complex]:
             missing.remove(r)
             missing.remove(r.conjugate())
     return roots + [r.conjugate() for r in missing if r.imag]
+
+
+def written(p: Process) -> str:
+    """Return a process as ``--process`` takes it.
+
+    Parameters
+    ----------
+    p : Process
+        The process.
+
+    Examples
+    --------
+    >>> from pidemu.loop.process import Process
+    >>> written(Process.from_lags(1.5, lags=[10, 2], integrators=1, delay=3))
+    'gain=1.5,lag=10,lag=2,integrators=1,delay=3'
+    """
+    words = [f"gain={exactly(p.gain)}"]
+    words += [_root(r, "lag", "pole") for r in p.poles if r and r.imag >= 0]
+    words += [_root(r, "lead", "zero") for r in p.zeros if r.imag >= 0]
+    if p.integrators:
+        words.append(f"integrators={p.integrators}")
+    if p.delay:
+        words.append(f"delay={exactly(p.delay)}")
+    return ",".join(words)
+
+
+def _root(r: complex, time: str, root: str) -> str:
+    """Return a root as a time constant where that is the same number, else in the s plane; a complex one brings its conjugate."""
+    if r.imag:
+        return f"{root}={r.real!r}{r.imag:+}j"
+    constant = exactly(-1 / r.real) if r.real else ""
+    if constant and -1 / float(constant) == r.real and (root == "zero" or r.real < 0):
+        return f"{time}={constant}"
+    return f"{root}={r.real!r}"

@@ -27,7 +27,8 @@ from pidemu.certificate.models import EXACT
 from pidemu.conversion.convert import Conversion
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
-from pidemu.report.command import command_for, exactly
+from pidemu.plain import exactly
+from pidemu.report.command import command_for
 from pidemu.report.curves import Who, bode, closed_loops, responses
 from pidemu.report.pictures import bode_picture, loops_picture, responses_picture
 
@@ -209,7 +210,7 @@ class Contents:
         yield "another firmware or other options; whether what was read off the old controller is what it ran with"
 
     @cached_property
-    def command(self) -> str | None:
+    def command(self) -> str:
         """The command that makes the conversion again."""
         return command_for(self.c)
 
