@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
-    from pidemu.conversion.convert import Conversion, convert
+    from pidemu.conversion.convert import convert
+    from pidemu.conversion.result import Conversion
     from pidemu.emulator import Controller
     from pidemu.errors import (
         CardError,
@@ -40,7 +41,7 @@ _HOMES = {
     "Card": "card.load",
     "Comparison": "comparison.compare",
     "compare": "comparison.compare",
-    "Conversion": "conversion.convert",
+    "Conversion": "conversion.result",
     "convert": "conversion.convert",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pidemu.conversion.convert import Conversion
+    from pidemu.conversion.result import Conversion
 
 
 class PidemuError(Exception):

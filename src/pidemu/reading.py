@@ -22,7 +22,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     """Read settings and options; see `Card.settings`."""
     given = dict(given)
     _refuse_twice(card, given)
-    pv_range, op_range = (_range(card, name, given.pop(name, None)) for name in RESERVED)
+    pv_range, op_range = (signal_range(card, name, given.pop(name, None)) for name in RESERVED)
     options = {k: v for k, v in given.items() if match_name(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
     notes: list[str] = []
@@ -91,7 +91,8 @@ def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, obje
     return chosen
 
 
-def _range(card: Card, name: str, given: object) -> tuple[float, float] | None:
+def signal_range(card: Card, name: str, given: object) -> tuple[float, float] | None:
+    """Return a signal range [engineering units]; raises `SettingError` where it is none."""
     if given is None:
         return None
     try:

@@ -9,7 +9,7 @@ from pidemu.certificate.models import EXACT, Band, Certificate, LoopComparison, 
 from pidemu.units import Role
 
 if TYPE_CHECKING:
-    from pidemu.conversion.convert import Conversion
+    from pidemu.conversion.result import Conversion
     from pidemu.settings import Value
 
 BAND_COLUMNS: Final = ("path", "band", "rad/s", "deviation", "gain", "phase")

@@ -16,7 +16,7 @@ from pidemu.certificate.figures import unit_of as _unit
 from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.choices import Attempt
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 

@@ -12,8 +12,9 @@ import click
 from pidemu.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.card.load import Card
 from pidemu.cli.common import number, print_json
-from pidemu.conversion.convert import Conversion, convert
+from pidemu.conversion.convert import convert
 from pidemu.conversion.request import Request
+from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
 from pidemu.plain import json_safe
 from pidemu.settings import Settings

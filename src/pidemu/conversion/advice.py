@@ -10,7 +10,7 @@ from pidemu.settings import Settings
 from pidemu.units import Role
 
 if TYPE_CHECKING:
-    from pidemu.conversion.convert import Conversion
+    from pidemu.conversion.result import Conversion
 
 _NOISE: Final = 1.25
 """Ratio of high-frequency gains from which noise is worth a word."""
@@ -43,8 +43,13 @@ def _ranges(c: Conversion) -> Iterator[str]:
             f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
             "engineering units"
         )
-    if c.factor < 0:
-        direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
+    direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
+    if c.factor < 0 and c.source.equation.action.fixed:
+        yield (
+            f"with these settings {c.source.card.id} is direct acting, by the sign of its gain: set the action to '{direct}' on "
+            f"{c.settings.card.id}"
+        )
+    elif c.factor < 0:
         yield (
             f"the source's gains are negative: these are positive, so set the action to '{direct}' where the source was reverse "
             f"acting, to '{reverse}' where it was direct acting"
@@ -116,6 +121,11 @@ def _noise(c: Conversion) -> Iterator[str]:
 
 
 def _action(source: Settings, target: Settings) -> Iterator[str]:
+    if target.equation.action.fixed and not source.equation.action.fixed:
+        yield (
+            f"action: {target.card.id} has no choice of it, the sign of the gains decides; these are for a loop that was reverse "
+            f"acting, '{source.equation.action.names['reverse']}' on {source.card.id}: where it was direct acting, turn their sign"
+        )
     old, new = source.equation.action.names, target.equation.action.names
     if {k: v.casefold() for k, v in old.items()} != {k: v.casefold() for k, v in new.items()}:
         yield (

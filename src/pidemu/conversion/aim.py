@@ -49,6 +49,8 @@ def read_aim(text: str | None) -> Aim:
     """
     if text is None:
         return Aim()
+    if not isinstance(text, str):
+        raise SettingError(f"match is {text!r}; it is a word such as 'textbook'")
     word, colon, rest = text.partition(":")
     found: Match | None = next((m for m in MATCHES if m == word.strip()), None)
     if found is None:

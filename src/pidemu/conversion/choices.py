@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
 from pidemu.card.load import Card
 from pidemu.card.models import Equation
+from pidemu.card.references import is_active
 from pidemu.certificate.models import RANK, Certificate, Verdict
 from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.match import NoMatchError
@@ -44,6 +45,8 @@ class Attempt:
         Whether nobody gave scan intervals and the two would differ at an equal one, by their scan rules.
     nonlinear_differs : bool
         Whether what is not linear, such as a squared error, differs from the source's.
+    unused : int
+        How many dials that the user gave are not in use with these options.
     error : PidemuError, NoMatchError or None
         Why it refuses.
     """
@@ -55,6 +58,7 @@ class Attempt:
     certificate: Certificate | None
     rules_differ: bool = False
     nonlinear_differs: bool = False
+    unused: int = 0
     error: Exception | None = None
 
     @property
@@ -64,13 +68,21 @@ class Attempt:
 
     @cached_property
     def rank(self) -> tuple[Any, ...]:
-        """What the choices are ordered by: verdict, scan rules, nonlinear options, both paths, changes to the card's defaults."""
+        """What the choices are ordered by: given dials in use, verdict, scan rules, nonlinear options, both paths, changes."""
         c = self.certificate
         if c is None:
-            return (RANK["refused"], False, False, 0, 0, len(self.changed))
+            return (True, self.unused, RANK["refused"], False, False, 0, 0, len(self.changed))
         setpoint = c.setpoint_at_scan or c.setpoint
         paths = (c.headline.loop_band.max_deviation, setpoint.loop_band.max_deviation)
-        return (RANK[c.verdict], self.rules_differ, self.nonlinear_differs, *(_coarse(d) for d in paths), len(self.changed))
+        return (
+            False,
+            self.unused,
+            RANK[c.verdict],
+            self.rules_differ,
+            self.nonlinear_differs,
+            *(_coarse(d) for d in paths),
+            len(self.changed),
+        )
 
 
 def _coarse(deviation: float) -> int:
@@ -81,7 +93,13 @@ def _coarse(deviation: float) -> int:
 
 
 def attempts(
-    card: Card, taken: Mapping[str, object], solver: Callable[[Mapping[str, object]], Solver], aim: Aim, *, every: bool
+    card: Card,
+    taken: Mapping[str, object],
+    solver: Callable[[Mapping[str, object]], Solver],
+    aim: Aim,
+    *,
+    wanted: Mapping[str, object],
+    every: bool,
 ) -> tuple[Attempt, ...]:
     """Return the attempts with every choice of the options that nobody chose, the best first.
 
@@ -95,6 +113,8 @@ def attempts(
         From options to the solver of the conversion.
     aim : Aim
         What to aim at.
+    wanted : mapping
+        Dials that the user has given: options with which these are in use come first.
     every : bool
         Whether to go on where the card's defaults are exact already.
     """
@@ -107,9 +127,10 @@ def attempts(
             if matters in seen:
                 continue
             seen.append(matters)
-        found.append(_attempt(options, changed, solver, aim))
+        unused = _unused(card.variant(options).equation, wanted)
+        found.append(replace(_attempt(options, changed, solver, aim), unused=unused))
         first = found[0]
-        if not every and first.verdict == "exact" and not (first.rules_differ or first.nonlinear_differs):
+        if not every and first.verdict == "exact" and not (first.rules_differ or first.nonlinear_differs or first.unused):
             break
     return tuple(sorted(found, key=lambda a: a.rank))
 
@@ -122,6 +143,12 @@ def _choices(card: Card, taken: Mapping[str, object]) -> Iterator[dict[str, str]
     combinations = itertools.product(*(card.options[name] for name in free))
     changes = [{n: c for n, c in zip(free, chosen, strict=True) if c != defaults[n]} for chosen in combinations]
     yield from sorted(changes, key=len)
+
+
+def _unused(e: Equation, wanted: Mapping[str, object]) -> int:
+    names = {n.casefold(): n for n in e.settings}
+    found = [names.get(n.casefold()) for n in wanted]
+    return sum(n is None or not is_active(e, n, e.settings[n]) for n in found)
 
 
 def _defaults(card: Card) -> dict[str, str]:

@@ -2,179 +2,34 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from numbers import Real
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.certificate.models import Certificate, Rounded, Verdict
-from pidemu.certificate.sentence import sentence
-from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
 from pidemu.conversion.advice import warnings_for
-from pidemu.conversion.aim import Match, read_aim
+from pidemu.conversion.aim import Aim, read_aim
 from pidemu.conversion.choices import Attempt, attempts
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.request import Request
+from pidemu.conversion.moments import check_optimiser
+from pidemu.conversion.request import Request, read_request
+from pidemu.conversion.result import Conversion, Textbook
+from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
-from pidemu.plain import json_safe
-from pidemu.settings import Settings, Value, limits
-from pidemu.units import Role, is_reciprocal, parse_unit
+from pidemu.settings import Settings, limits
+from pidemu.units import Role
 
 if TYPE_CHECKING:
-    from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
-
-_SCAN_RULES: Final = ("integral.rule", "derivative.rule", "derivative.filter.rule")
-
-
-@dataclass(frozen=True)
-class Textbook:
-    """What the rule in manuals would have given, shown beside the default.
-
-    Attributes
-    ----------
-    settings : Settings or None
-        The settings; ``None`` where the rule has no answer or the target refuses it.
-    certificate : Certificate or None
-        Its figures.
-    reason : str
-        Why there is no answer.
-    """
-
-    settings: Settings | None
-    certificate: Certificate | None
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Conversion:
-    """Settings of a target that stand for those of a source.
-
-    Attributes
-    ----------
-    source, settings : Settings
-        The source's and the target's settings.
-    match : str
-        How they were found: exact, low-frequency, textbook, frequency, loop or constrained.
-    certificate : Certificate
-        How near they are.
-    textbook : Textbook
-        What the textbook rule would have given.
-    warnings : tuple of str
-        What the target does differently, in words.
-    refusal : str
-        Why the target refused, where these are only the nearest settings.
-    chosen : dict of str to str
-        Options of the target that were chosen here, because nobody gave them, and are not as the card delivers them.
-    ranking : tuple of Attempt
-        The choices of the options that were looked at, the best first.
-    factor : float
-        What the source's gain was multiplied by for new signal ranges; negative where the action changes.
-    scan : tuple of float or None
-        Scan intervals of source and target [s].
-    process : Process or None
-        The process, where it was given.
-    request : Request
-        What was asked for.
-    """
-
-    source: Settings
-    settings: Settings
-    match: Match
-    certificate: Certificate
-    textbook: Textbook
-    warnings: tuple[str, ...]
-    refusal: str = ""
-    chosen: Mapping[str, str] = field(default_factory=dict)
-    ranking: tuple[Attempt, ...] = ()
-    factor: float = 1.0
-    scan: tuple[float, float] | None = None
-    process: Process | None = None
-    request: Request = field(default_factory=Request)
-
-    @property
-    def verdict(self) -> Verdict:
-        """``exact``, ``exact-feedback`` or ``approximate``."""
-        return self.certificate.verdict
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence for whoever stands at the loop."""
-        return sentence(self.certificate)
-
-    @property
-    def setpoint_filter(self) -> SetpointFilter | None:
-        """The setpoint filter that would make the setpoint paths agree; ``None`` where they do, or where no filter can."""
-        return setpoint_filter(self.source.law(), self.settings.law(), self.factor)
-
-    def transfer_plan(self, sp: float, pv: float, op: float) -> TransferPlan:
-        """Return what to set, and in which order, so that the cut-over to the target does not bump.
-
-        Parameters
-        ----------
-        sp, pv, op : float
-            Setpoint, measurement and output at the cut-over [engineering units where the ranges are given, else %].
-        """
-        from pidemu.cutover.plan import transfer_plan
-
-        return transfer_plan(self.settings, sp, pv, op, scan=self.scan[1] if self.scan else None)
-
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What the result rests on without anybody having said so; what makes the law first."""
-        found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
-        law = [text for a, text in found if a.makes_the_law]
-        return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
-
-    @property
-    def law_assumptions(self) -> tuple[str, ...]:
-        """Those of `assumptions` that the settings rest on: what makes the law and, where these make up for scans, scan rules."""
-        cost = self.certificate.scan_cost
-        rules = _SCAN_RULES if cost is not None and cost.compensated else ()
-        found = [(s, a) for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law or a.path in rules]
-        return tuple(dict.fromkeys(f"{s.card.id}: {a}" for s, a in found))
-
-    @property
-    def inferences(self) -> tuple[str, ...]:
-        """What of the two equations is inferred from something documented, not itself stated."""
-        found = [f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.inferences()]
-        return tuple(dict.fromkeys(found))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, the form of ``pidemu convert --json``."""
-        plain = {
-            "from": self.source.to_dict(),
-            "to": self.settings.to_dict(),
-            "match": self.match,
-            "verdict": self.verdict,
-            "sentence": self.sentence,
-            "chosen": dict(self.chosen),
-            "certificate": self.certificate.to_dict(),
-            "textbook": {
-                "to": self.textbook.settings.to_dict() if self.textbook.settings else None,
-                "certificate": self.textbook.certificate.to_dict() if self.textbook.certificate else None,
-                "reason": self.textbook.reason,
-            },
-            "scan": list(self.scan) if self.scan else None,
-            "gain_factor": self.factor,
-            "process": str(self.process) if self.process else None,
-            "setpoint_filter": self.setpoint_filter.to_dict() if self.setpoint_filter else None,
-            "warnings": list(self.warnings),
-            "notes": [*self.source.notes, *self.settings.notes],
-            "assumptions": list(self.assumptions),
-            "inferences": list(self.inferences),
-        }
-        safe: dict[str, Any] = json_safe(plain)
-        return safe
+_SMALLEST, _LARGEST = 1e-100, 1e100
+"""Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
 
 def convert(
@@ -251,59 +106,79 @@ def convert(
     >>> conv.verdict, round(conv.settings["K"].value, 4), conv.settings["Ti"].value, conv.settings["Td"].value
     ('exact', 2.6667, 20.0, 3.75)
     """
+    aim = _aim(match, process)
+    card = target if isinstance(target, Card) else load_card(target)
+    _refuse_recursions(source, card)
+    _refuse_absurd_gains(source)
+    request = read_request(card, options, given, scan, match, pv_range, op_range)
+    request = replace(request, process=process, compensate=compensate, allow_approximate=allow_approximate, round_dials=round_dials)
+    factor = _rescaling(source, request)
+    taken = {**(source.options if source.card.id == card.id else {}), **request.options}
+    fixed = {**_shared(source, card), **request.given}
+    if request.scan is not None:
+        source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
+
+    def solver(named: Mapping[str, object]) -> Solver:
+        goal = Target(card, named, fixed, request.pv_range or source.pv_range, request.op_range or source.op_range)
+        goal.reject_missing()
+        sign = -1 if _is_negative(source, goal) else 1
+        return Solver(source, goal, sign * factor, request.scan, process, compensate=compensate)
+
+    ranking = attempts(card, taken, solver, aim, wanted=request.given, every=all_options)
+    best, refusal, settings = ranking[0], "", ranking[0].settings
+    if settings is None:
+        best, refusal, settings = _nearest(ranking)
+        refusal += _other_options(attempts(card, {}, solver, aim, wanted=request.given, every=False)[0], taken) if options else ""
+        if settings is None:
+            raise ConversionRefusedError(refusal)
+    work = best.solver
+    assert work is not None  # there are settings
+    before = settings
+    settings, dials = rounded(settings) if round_dials else (settings, ())
+    certificate = full_certificate(work, settings, emulate=emulate)
+    if dials:
+        certificate = replace(certificate, dials=dials, feedback_before_rounding=work.certify(before).feedback)
+    conversion = Conversion(
+        source=source,
+        settings=settings,
+        match=best.match,
+        certificate=certificate,
+        textbook=_textbook(work),
+        warnings=(),
+        refusal=refusal,
+        chosen=dict(best.changed),
+        ranking=ranking,
+        factor=work.factor,
+        scan=request.scan,
+        process=process,
+        request=request,
+    )
+    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
+    if refusal and not allow_approximate:
+        raise ConversionRefusedError(refusal, conversion)
+    return conversion
+
+
+def _aim(match: str | None, process: Process | None) -> Aim:
+    """Read the match, and refuse one that lacks what it needs."""
     aim = read_aim(match)
     if process is None and aim.frequency is None and aim.match in ("frequency", "loop"):
         other = " or a frequency, frequency:0.02rad/s" if aim.match == "frequency" else ""
         raise SettingError(
             f"the match '{aim.match}' needs the process{other}; give process=, or --process gain=...,lag=...,delay=..."
         )
-    card = target if isinstance(target, Card) else load_card(target)
-    _refuse_recursions(source, card)
-    factor = _rescaling(source, pv_range, op_range)
-    scans = _scans(scan)
-    same = source.card.id == card.id
-    taken = {**(source.options if same else {}), **_named_as(card, options or {})}
-    fixed = {**_shared(source, card), **(given or {})}
-    if scans is not None:
-        source.law(scans[0])  # refuses an interval that is none
+    if aim.match == "loop":
+        check_optimiser()
+    return aim
 
-    def solver(named: Mapping[str, object]) -> Solver:
-        goal = Target(card, named, fixed, pv_range or source.pv_range, op_range or source.op_range)
-        goal.reject_missing()
-        sign = -1 if _is_negative(source, goal) else 1
-        return Solver(source, goal, sign * factor, scans, process, compensate=compensate)
 
-    ranking = attempts(card, taken, solver, aim, every=all_options)
-    best = ranking[0]
-    work, settings, how, refusal = best.solver, best.settings, best.match, ""
-    if settings is None or work is None:
-        first = min(ranking, key=lambda a: len(a.changed))
-        if first.solver is None or first.error is None or isinstance(first.error, ScanError):
-            raise first.error or ConversionRefusedError(f"{card.id} has no options left to try")
-        work = first.solver
-        settings, refusal = work.refused(first.error)
-        refusal += _other_options(attempts(card, {}, solver, aim, every=False)[0], taken) if options else ""
-        if settings is None:
-            raise ConversionRefusedError(refusal)
-        best, how = first, "constrained"
-    exact_dials = settings
-    if round_dials:
-        settings, rounded = _rounded(settings)
-    certificate = full_certificate(work, settings, emulate=emulate)
-    if round_dials and rounded:
-        before = work.certify(exact_dials).feedback
-        certificate = replace(certificate, dials=rounded, feedback_before_rounding=before)
-    request = Request(
-        options or {}, given or {}, scans, match, pv_range, op_range, process, compensate, allow_approximate, round_dials
-    )
-    book, chosen = _textbook(work), dict(best.changed)
-    conversion = Conversion(
-        source, settings, how, certificate, book, (), refusal, chosen, ranking, work.factor, scans, process, request
-    )
-    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
-    if refusal and not allow_approximate:
-        raise ConversionRefusedError(refusal, conversion)
-    return conversion
+def _nearest(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | None]:
+    """Return what is nearest to the source with the options as delivered or chosen by the user, and why the target refuses."""
+    first = min(ranking, key=lambda a: len(a.changed))
+    if first.solver is None or first.error is None or isinstance(first.error, ScanError):
+        raise first.error or ConversionRefusedError("there are no options left to try")
+    settings, refusal = first.solver.refused(first.error)
+    return replace(first, match="constrained"), refusal, settings
 
 
 def _other_options(attempt: Attempt, taken: Mapping[str, object]) -> str:
@@ -327,23 +202,11 @@ def _refuse_recursions(source: Settings, target: Card) -> None:
             )
 
 
-def _scans(scan: float | tuple[float, float] | None) -> tuple[float, float] | None:
-    """Return the scan intervals of source and target [s]."""
-    if scan is None:
-        return None
-    try:
-        pair = (float(scan), float(scan)) if isinstance(scan, Real) else tuple(float(h) for h in scan)  # type: ignore[union-attr]
-    except (TypeError, ValueError):
-        pair = ()
-    if len(pair) != 2 or not all(math.isfinite(h) and h > 0 for h in pair):
-        raise ScanError(f"scan is {scan!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
-    return pair[0], pair[1]
-
-
-def _named_as(card: Card, options: Mapping[str, object]) -> dict[str, object]:
-    """Return options under the card's own spelling of their names."""
-    names = {o.casefold(): o for o in card.options}
-    return {names.get(o.casefold(), o): choice for o, choice in options.items()}
+def _refuse_absurd_gains(source: Settings) -> None:
+    a = source.algorithm()
+    for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
+        if gain and not _SMALLEST < abs(gain) < _LARGEST:
+            raise SettingError(f"{source.card.id}: a {name} gain of {gain:g} is none that a controller has; check the settings")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
@@ -372,30 +235,14 @@ def _textbook(solver: Solver) -> Textbook:
         return Textbook(None, None, str(error))
 
 
-def _rescaling(source: Settings, pv: tuple[float, float] | None, op: tuple[float, float] | None) -> float:
+def _rescaling(source: Settings, request: Request) -> float:
     """Return the factor on the percent gain for new ranges (specs/equations.md, section 3, rescaling)."""
     factor = 1.0
-    for name, new, old, power in (("pv_range", pv, source.pv_range, 1), ("op_range", op, source.op_range, -1)):
+    for name, new, old, power in (
+        ("pv_range", request.pv_range, source.pv_range, 1), ("op_range", request.op_range, source.op_range, -1),
+    ):  # fmt: skip
         if new is not None and old is None and new != (0.0, 100.0):
             raise SettingError(f"{source.card.id}: the target's {name} is given, the source's is not; give both")
         if new is not None and old is not None:
             factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
     return factor
-
-
-def _rounded(settings: Settings) -> tuple[Settings, tuple[Rounded, ...]]:
-    """Round every dial that has a resolution."""
-    values = {name: _round(value) for name, value in settings.items()}
-    dials = tuple(Rounded(n, settings[n].value, v.value) for n, v in values.items() if v.value != settings[n].value)
-    return replace(settings, values_by_name=values), dials
-
-
-def _round(value: Value) -> Value:
-    step = value.setting.resolution
-    if step is None or not value.active or value.off:
-        return value
-    low, high = limits(value.setting)
-    new = float(f"{min(max(round(value.value / step) * step, low), high):.12g}")
-    if new == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
-        new = step  # zero would be infinite action
-    return replace(value, value=new)

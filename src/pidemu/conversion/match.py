@@ -145,8 +145,14 @@ def _complex_zeros(n0: float, n1: float, n2: float) -> str:
     ratio = n1 * n1 / (n0 * n2)
     return (
         "the source has complex zeros: as a standard form its integral time is "
-        f"{ratio:.4g} times its derivative time, and a series form needs 4 times or more"
+        f"{_apart(ratio, 4.0)[0]} times its derivative time, and a series form needs 4 times or more"
     )
+
+
+def _apart(x: float, y: float) -> tuple[str, str]:
+    """Return two numbers with four digits, or as many more as tell them apart."""
+    digits = next((d for d in range(4, 16) if f"{x:.{d}g}" != f"{y:.{d}g}"), 16)
+    return f"{x:.{digits}g}", f"{y:.{digits}g}"
 
 
 def _through_signal_filter(n0: float, n1: float, n2: float, Tf: float, target: Target) -> Iterator[Numbers]:
@@ -202,9 +208,9 @@ def _series_roots(m0: float, m1: float, m2: float, filt: TargetFilter) -> Iterat
     linear, square = m1 - m0 * tau, m0 * (1 + sigma)
     root = linear * linear - 4 * square * m2
     if root < -_ROUNDING * linear * linear:
+        has, needs = _apart(m1 * m1 / (m0 * m2), 4 * (1 + sigma))
         raise NoMatchError(
-            f"the source, with moments m1^2/(m0 m2) = {m1 * m1 / (m0 * m2):.4g}, has no equivalent in this series form, "
-            f"which needs {4 * (1 + sigma):.4g} or more"
+            f"the source, with moments m1^2/(m0 m2) = {has}, has no equivalent in this series form, which needs {needs} or more"
         )
     sum_ = linear + math.copysign(math.sqrt(max(root, 0.0)), linear)
     for D in (2 * m2 / sum_ if m2 else 0.0, sum_ / (2 * square) if m2 and square else None):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy.typing as npt
 from pidemu.certificate.linear import bands
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.target import Numbers, Target
+from pidemu.errors import PidemuError
 from pidemu.law import Law
 
 if TYPE_CHECKING:
@@ -141,6 +143,18 @@ def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence
     except np.linalg.LinAlgError:
         raise NoMatchError("without derivative action, gain and phase cannot both be kept at one frequency") from None
     raise NoMatchError(f"no settings that keep the integral gain have the source's gain and phase at {w:g} rad/s")
+
+
+def check_optimiser() -> None:
+    """Refuse a match in the loop, before anything is computed for it, where scipy is not installed.
+
+    Raises
+    ------
+    PidemuError
+        It is not.
+    """
+    if find_spec("scipy") is None:
+        raise PidemuError("the match 'loop' needs scipy, which is not installed; pip install 'pidemu[loop]'")
 
 
 def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Sequence[float]:

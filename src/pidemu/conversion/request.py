@@ -1,13 +1,18 @@
-"""What a conversion was asked for, and how to ask for it again on the command line."""
+"""What a conversion is asked for: read, checked, and written as words of the command line."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import TYPE_CHECKING
 
+from pidemu.card.load import Card
+from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
+from pidemu.reading import signal_range
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
@@ -63,3 +68,53 @@ class Request:
             "--allow-approximate": self.allow_approximate,
         }
         yield from (flag for flag, wanted in flags.items() if wanted)
+
+
+def read_request(
+    card: Card,
+    options: Mapping[str, object] | None,
+    given: Mapping[str, object] | None,
+    scan: object,
+    match: str | None,
+    pv_range: object,
+    op_range: object,
+) -> Request:
+    """Return what is asked for, checked; see `convert` for the arguments.
+
+    An option among the dials is taken for the option that it is.
+
+    Raises
+    ------
+    SettingError
+        A name comes twice, or a range is none.
+    ScanError
+        A scan interval is no positive number.
+    """
+    named: dict[str, object] = {}
+    for name, value in [*(options or {}).items(), *(given or {}).items()]:
+        if any(str(name).casefold() == other.casefold() for other in named):
+            raise SettingError(f"{card.id}: {name} is given twice; give it once")
+        if value is not None:
+            named[str(name)] = value
+    spelled = {o.casefold(): o for o in card.options}
+    chosen = {spelled.get(n.casefold(), n): x for n, x in named.items() if n.casefold() in spelled or n in (options or {})}
+    dials = {n: x for n, x in named.items() if n.casefold() not in spelled and n not in (options or {})}
+    pv, op = signal_range(card, "pv_range", pv_range), signal_range(card, "op_range", op_range)
+    return Request(chosen, dials, _scans(scan), match, pv, op)
+
+
+def _scans(scan: object) -> tuple[float, float] | None:
+    """Return the scan intervals of source and target [s]."""
+    if scan is None:
+        return None
+    pair: tuple[float, ...] = ()
+    try:
+        if isinstance(scan, Real) and not isinstance(scan, bool):
+            pair = (float(scan), float(scan))
+        elif not isinstance(scan, bool):
+            pair = tuple(float(h) for h in scan)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        pair = ()
+    if len(pair) != 2 or not all(math.isfinite(h) and h > 0 for h in pair):
+        raise ScanError(f"scan is {scan!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
+    return pair[0], pair[1]

@@ -327,7 +327,13 @@ class Target:
                 return off[0]
             if role is Role.INTEGRAL:
                 raise SettingError(f"{name} cannot be switched off: the card states no off value")
-        return from_canonical(role, value, parse_unit(setting.unit), self.spans)
+        found = from_canonical(role, value, parse_unit(setting.unit), self.spans)
+        if value and role in (Role.INTEGRAL, Role.DERIVATIVE) and found in off:
+            low, high = limits(setting)
+            raise SettingError(
+                f"{name}: {found:g} {setting.unit} is outside {low:g} to {high:g} {setting.unit}; it switches it off"
+            )
+        return found
 
     def _filter_dial(self, Tf: float, base: float) -> dict[str, float]:
         f = self.filter

@@ -9,7 +9,8 @@ from typing import Any, Final, Literal
 
 from pidemu.card.library import load_card
 from pidemu.certificate.models import EXACT
-from pidemu.conversion.convert import Conversion, convert
+from pidemu.conversion.convert import convert
+from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
 from pidemu.matrix.typical import held_dials, typical_settings

@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.report.contents import Contents

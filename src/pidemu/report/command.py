@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
 

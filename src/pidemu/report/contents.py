@@ -24,7 +24,7 @@ from pidemu.certificate.figures import (
     unit_of,
 )
 from pidemu.certificate.models import EXACT
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pidemu.certificate.scanwise import WIDE
 from pidemu.comparison.side_by_side import run_on
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.law import Law
 from pidemu.rational import Response
