@@ -28,7 +28,7 @@ from pidemu.units import Role
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
-_SMALLEST, _LARGEST = 1e-100, 1e100
+_SMALLEST, _LARGEST = 1e-120, 1e120
 """Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
 
@@ -206,7 +206,7 @@ def _refuse_absurd_gains(source: Settings) -> None:
     a = source.algorithm()
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: a {name} gain of {gain:g} is none that a controller has; check the settings")
+            raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
