@@ -135,7 +135,7 @@ def convert(
     assert work is not None  # there are settings
     before = settings
     settings, dials = rounded(settings) if round_dials else (settings, ())
-    certificate = full_certificate(work, settings, emulate=emulate)
+    certificate = full_certificate(work, settings, work.scan_cost(before, best.match), emulate=emulate)
     if dials:
         certificate = replace(certificate, dials=dials, feedback_before_rounding=work.certify(before).feedback)
     conversion = Conversion(

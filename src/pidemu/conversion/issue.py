@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pidemu.certificate.models import Certificate
+from pidemu.certificate.models import Certificate, ScanCost
 from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.scanwise import common_interval, emulated
 from pidemu.conversion.solve import Solver
@@ -13,7 +13,7 @@ from pidemu.record.standard import scale_of
 from pidemu.settings import Settings
 
 
-def full_certificate(work: Solver, settings: Settings, *, emulate: bool) -> Certificate:
+def full_certificate(work: Solver, settings: Settings, cost: ScanCost | None, *, emulate: bool) -> Certificate:
     """Return the certificate of a conversion's settings (specs/equations.md, section 9).
 
     Parameters
@@ -22,10 +22,12 @@ def full_certificate(work: Solver, settings: Settings, *, emulate: bool) -> Cert
         The conversion.
     settings : Settings
         The target's settings.
+    cost : ScanCost or None
+        What the scan intervals cost.
     emulate : bool
         Whether both controllers are emulated, for the points 3, 5 and 6.
     """
-    certificate = replace(work.certify(settings), scan_cost=work.scan_cost(settings))
+    certificate = replace(work.certify(settings), scan_cost=cost)
     if not emulate:
         return certificate
     source = work.source

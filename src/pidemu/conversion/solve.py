@@ -128,14 +128,15 @@ class Solver:
             return deviation(self.at_source_scan, settings.law(self.scans[1]), band, self.factor)
         return deviation(self.law, settings.law(), band, self.factor)
 
-    def scan_cost(self, settings: Settings) -> ScanCost | None:
-        """Return what the scan intervals cost, with the settings of the continuous law and with these."""
+    def scan_cost(self, settings: Settings, how: Match) -> ScanCost | None:
+        """Return what the scan intervals cost, with the settings of the continuous law and with these, that were found so."""
         if self.scans is None:
             return None
         end = bands(self.law, max(self.scans), self.process)[0][1]
         plain = settings
-        with suppress(NoMatchError, SettingError):
-            plain = self._continuous().closed(None)[0]
+        if how not in ("textbook", "constrained"):  # these know nothing of scans
+            with suppress(NoMatchError, SettingError):
+                plain = self._continuous().closed(None)[0]
         return ScanCost(end, scan_phase(end, self.scans), plain != settings, self.deviation(plain))
 
     def _continuous(self) -> Solver:
