@@ -1,0 +1,296 @@
+"""Conversions from one scan interval and rule to another: what a process sees of both, found by emulation."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+import pidemu
+from pidemu.card.load import Card
+from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.settings import Settings
+from tests.conversion.support import Floats, difference, outputs, random_signal
+from tests.helpers import WIDE, made_up_card
+
+RULES = ("backward", "forward", "trapezoidal")
+CARDS = {rule: made_up_card(integral={"rule": rule, "windup": {"scheme": "none"}}) for rule in RULES}
+"""A parallel PID without filter under each rule of the integral."""
+H = 0.5
+
+KP, KI, KD = 2.0, 0.1, 8.0
+BY_HAND = {
+    "PI": {"backward": (2.05, -2.0, 0.0), "forward": (2.0, -1.95, 0.0), "trapezoidal": (2.025, -1.975, 0.0)},
+    "PID": {"backward": (18.05, -34.0, 16.0), "forward": (18.0, -33.95, 16.0), "trapezoidal": (18.025, -33.975, 16.0)},
+}
+"""What a scan adds to the output, ``q0 e_n + q1 e_(n-1) + q2 e_(n-2)``, for KP, KI, KD (none for PI) at H, in the head."""
+KP_FOR = {
+    ("backward", "forward"): 2.05, ("backward", "trapezoidal"): 2.025, ("forward", "backward"): 1.95,
+    ("forward", "trapezoidal"): 1.975, ("trapezoidal", "backward"): 1.975, ("trapezoidal", "forward"): 2.025,
+}  # fmt: skip
+"""The proportional gain that makes one rule's increments of the other's: by half a scan of the integral, or by a whole one."""
+
+
+def settings(card: str | Card, **values: object) -> Settings:
+    return (pidemu.load_card(card) if isinstance(card, str) else card).settings(values)
+
+
+def convert(source: Settings, target: str | Card, **more: object) -> pidemu.Conversion:
+    return pidemu.convert(source, target, **{"emulate": False, **more})  # type: ignore[arg-type]
+
+
+def increments(s: Settings, h: float, scans: int) -> Floats:
+    """What an emulated controller at rest adds to its output, scan by scan, after the measurement fell by 1 for one scan."""
+    controller = pidemu.Controller(s, h, output_limits=WIDE)
+    controller.rest(0.0, 0.0, 0.0)
+    pulse = np.zeros(scans)
+    pulse[0] = 1.0
+    return np.asarray(np.diff(controller.run(np.zeros(scans), -pulse), prepend=0.0))
+
+
+def memory(s: Settings, h: float) -> int:
+    """Return how many scans it takes until nothing is left of a pulse: by the pole of the derivative filter under its rule."""
+    a = s.algorithm()
+    pole = {
+        "backward": a.Tf / (a.Tf + h),
+        "forward": 1 - h / a.Tf if a.Tf else 0.0,
+        "trapezoidal": (2 * a.Tf - h) / (2 * a.Tf + h) if a.Tf else 0.0,
+        "lagged-difference": math.exp(-h / a.Tf) if a.Tf else 0.0,
+    }[a.derivative_rule.value]
+    return 10 + math.ceil(30 / -math.log(abs(pole))) if pole else 10
+
+
+def seen(s: Settings, h: float, terms: int = 4) -> list[float]:
+    """Moments of what a process sees: ``s C(z) (1 - z^-1)/(s h) = sum g_n exp(-n h s)/h``, with the increments ``g_n``."""
+    g, n = increments(s, h, memory(s, h)), np.arange(memory(s, h))
+    return [float(np.sum(g * (-n * h) ** k)) / (h * math.factorial(k)) for k in range(terms)]
+
+
+@pytest.mark.parametrize("kind", BY_HAND)
+@pytest.mark.parametrize("rule", RULES)
+def test_the_increments_worked_out_by_hand_are_those_of_the_emulated_controller(kind: str, rule: str) -> None:
+    found = increments(settings(CARDS[rule], kp=KP, ki=KI, kd=KD if kind == "PID" else 0), H, 6)
+    assert found == pytest.approx([*BY_HAND[kind][rule], 0, 0, 0], abs=1e-13)  # sums of numbers up to 34
+
+
+@pytest.mark.parametrize("kind", BY_HAND)
+@pytest.mark.parametrize(("rule", "other"), list(itertools.permutations(RULES, 2)))
+def test_from_rule_to_rule_at_one_interval_a_pid_without_filter_is_exact(kind: str, rule: str, other: str) -> None:
+    kd = KD if kind == "PID" else 0.0
+    found = convert(settings(CARDS[rule], kp=KP, ki=KI, kd=kd), CARDS[other], scan=H, emulate=True)
+    assert (found.match, found.verdict) == ("exact", "exact")
+    dials = {name: found.settings[name].value for name in ("kp", "ki", "kd")}
+    assert dials == pytest.approx({"kp": KP_FOR[rule, other], "ki": KI, "kd": kd}, rel=1e-12)
+    assert increments(found.settings, H, 6) == pytest.approx([*BY_HAND[kind][rule], 0, 0, 0], abs=1e-12)
+    for seed in range(3):
+        sp, pv = random_signal(seed), random_signal(100 + seed)
+        a, b = (outputs(s, sp, pv, H) for s in (found.source, found.settings))
+        assert np.ptp(a) > 1
+        assert difference(a, b) < 1e-9  # 200 scans of doubles
+
+
+@pytest.mark.parametrize("kp", [0.0, 0.02])
+def test_where_the_gain_would_have_to_be_negative_the_settings_of_the_continuous_law_stay(kp: float) -> None:
+    found = convert(settings(CARDS["forward"], kp=kp, ki=KI), CARDS["backward"], scan=H)  # kp - ki h is below zero
+    assert {n: v.value for n, v in found.settings.items()} == {"kp": kp, "ki": KI, "kd": 0.0}
+    assert found.verdict == "approximate"
+
+
+def test_the_textbook_s_rule_to_scale_the_gain_by_the_intervals_is_not_followed() -> None:
+    found = convert(settings(CARDS["backward"], kp=KP, ki=KI), CARDS["backward"], scan=(1.0, 0.25))
+    assert {n: v.value for n, v in found.settings.items()} == {"kp": KP, "ki": KI, "kd": 0.0}
+
+
+TARGETS: dict[str, tuple[str, Mapping[str, object]]] = {
+    "backward": ("generic/parallel", {}),
+    "backward, standard": ("generic/standard", {}),
+    "forward": ("mathworks/pid2", {"FORM": "parallel", "IFormula": "ForwardEuler", "DFormula": "ForwardEuler"}),
+    "trapezoidal": ("mathworks/pid2", {"FORM": "standard", "IFormula": "Trapezoidal", "DFormula": "Trapezoidal"}),
+    "lagged difference": ("advanced-pid/advanced-pid", {}),
+    "series": ("generic/series", {}),
+}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@hypothesis.settings(max_examples=15)
+@given(Ti=st.floats(20, 60), Td=st.floats(0.05, 0.15), Tf=st.floats(0.1, 0.3), h=st.floats(0.2, 1.0), times=st.floats(0.2, 5.0))
+def test_the_moments_of_what_a_process_sees_agree(name: str, Ti: float, Td: float, Tf: float, h: float, times: float) -> None:
+    target, options = TARGETS[name]
+    source = settings("generic/standard", K=1.5, Ti=Ti, Td=Td * Ti, Tf=Tf * Td * Ti)
+    scans = h, h * times
+    try:
+        found = convert(source, target, options=options, scan=scans)
+    except ScanError:  # the forward rule needs a filter longer than half a scan
+        assume(False)
+    cost = found.certificate.scan_cost
+    assert cost is not None
+    assume(cost.compensated and found.match == "low-frequency")  # else moments that agree would be farther off in the loop band
+    assume(memory(found.settings, scans[1]) < 500)  # the trapezoidal rule rings with a short filter, and the sums lose digits
+    wanted, reached = seen(source, scans[0]), seen(found.settings, scans[1])
+    sizes = 1.5 / Ti, 1.5, 1.5 * Ti, 1.5 * Ti**2
+    for k in range(3):
+        assert abs(wanted[k] - reached[k]) < 1e-8 * sizes[k]  # the sums have n^2 h^2 as factors
+    longer = found.settings.algorithm().Tf > 0.5 * scans[1]
+    if name in ("backward", "backward, standard") and found.settings["Tf"].value > 0 and longer:  # m3 by the free filter
+        assert abs(wanted[3] - reached[3]) < 1e-4 * sizes[3]
+
+
+@pytest.mark.parametrize("name", [n for n in TARGETS if n != "series"])
+@pytest.mark.parametrize("scans", [(1.0, 0.5), (1.0, 0.1)])
+def test_a_faster_scan_is_made_up_for_with_less_derivative(name: str, scans: tuple[float, float]) -> None:
+    target, options = TARGETS[name]
+    found = convert(settings("generic/standard", K=1.5, Ti=40, Td=6, Tf=1), target, options=options, scan=scans)
+    cost = found.certificate.scan_cost
+    assert cost is not None
+    assert cost.compensated
+    assert cost.uncompensated > 2 * found.certificate.headline.loop_band.max_deviation
+    m0, m1, m2 = seen(found.settings, scans[1], 3)
+    assert (m0, m1, m2) == pytest.approx((1.5 / 40, 1.5, 1.5 * (6 - scans[0] / 2)), rel=1e-9)  # kd - kp h/2, of the source
+
+
+@hypothesis.settings(max_examples=25)
+@given(
+    Ti=st.floats(5, 100),
+    Td=st.floats(0, 0.25),
+    alpha=st.floats(0, 0.4),
+    h=st.floats(0.05, 2),
+    times=st.floats(0.1, 10),
+    name=st.sampled_from([*TARGETS]),
+)
+def test_settings_made_up_for_the_scans_are_never_farther_off(
+    Ti: float, Td: float, alpha: float, h: float, times: float, name: str
+) -> None:
+    target, options = TARGETS[name]
+    source = settings("generic/series", K=1.5, Ti=Ti, Td=Td * Ti if Td > 0.02 else 0.0, alpha=alpha if alpha > 0.02 else 0.0)
+    try:
+        own, plain = (convert(source, target, options=options, scan=(h, h * times), compensate=c) for c in (True, False))
+    except (ConversionRefusedError, ScanError):
+        assume(False)
+    assume(all(memory(c.settings, h * times) < 1000 for c in (own, plain)))
+    off, without = (deviation(c, (h, h * times)) for c in (own, plain))
+    assert off <= without * (1 + 1e-6)
+    cost = own.certificate.scan_cost
+    assert cost is not None
+    made_up = own.match not in ("textbook", "constrained")  # these know nothing of scans
+    assert cost.compensated == (made_up and own.settings != plain.settings)
+    assert cost.uncompensated == pytest.approx(without if made_up else off, rel=2e-3, abs=1e-9)  # it looks closer at its peaks
+
+
+def deviation(c: pidemu.Conversion, scans: tuple[float, float]) -> float:
+    """Largest deviation over the loop band, both sampled and held, by the increments that emulations show."""
+    m0, m1, _ = c.source.law().moments()
+    w = np.geomspace(0.01 * m0 / m1, min(5 * m0 / m1, math.pi / max(scans)), 200)
+    held = []
+    for s, h in zip((c.source, c.settings), scans, strict=True):
+        g = increments(s, h, memory(s, h))
+        held.append(np.exp(-1j * np.outer(w, np.arange(g.size) * h)) @ g / (1j * w * h))
+    return float(np.max(np.abs(held[1] / held[0] - 1)))
+
+
+@pytest.mark.parametrize(
+    ("scans", "at", "phase"),
+    [
+        ((1.0, 0.5), 0.25, -3.580986),  # 5/Ti, and 0.25 x (-0.5)/2 rad
+        ((0.5, 1.0), 0.25, 3.580986),
+        ((2.0, 2.0), 0.25, 0.0),
+        ((1.0, 20.0), math.pi / 20, 85.5),  # where the bands end at the slower scan's Nyquist frequency: pi/20 x 19/2
+    ],
+)
+def test_the_scan_cost_is_half_the_difference_of_the_intervals_as_dead_time(
+    scans: tuple[float, float], at: float, phase: float
+) -> None:
+    cost = convert(settings("generic/standard", K=2, Ti=20), "generic/parallel", scan=scans).certificate.scan_cost
+    assert cost is not None
+    assert (cost.at, cost.phase_deg) == pytest.approx((at, phase), rel=1e-6)
+
+
+def test_without_scan_intervals_there_is_no_scan_cost() -> None:
+    assert convert(settings("generic/standard", K=2, Ti=20), "generic/parallel").certificate.scan_cost is None
+
+
+def test_the_same_equation_at_the_same_scan_costs_nothing() -> None:
+    found = convert(settings("generic/standard", K=2, Ti=20, Td=4, Tf=0.5), "generic/parallel", scan=1.0)
+    cost = found.certificate.scan_cost
+    assert cost is not None
+    assert (cost.at, cost.uncompensated) == pytest.approx((0.25, 0.0), abs=1e-12)
+    assert (cost.phase_deg, cost.compensated) == (0.0, False)
+    assert not any("scan intervals" in w for w in found.warnings)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("scans", [(1.0, 0.25), (0.25, 1.0), (1.0, 1.0)])
+def test_without_compensation_the_settings_are_those_of_the_continuous_law(name: str, scans: tuple[float, float]) -> None:
+    target, options = TARGETS[name]
+    source = settings("generic/series", K=1.5, Ti=40, Td=6, alpha=0.2)
+    plain = convert(source, target, options=options, scan=scans, compensate=False)
+    assert plain.settings == convert(source, target, options=options).settings
+    cost = plain.certificate.scan_cost
+    assert cost is not None
+    assert not cost.compensated
+    assert cost.uncompensated == plain.certificate.headline.loop_band.max_deviation
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("scans", [(0.1, 1.0), (1.0, 0.1), (0.5, 5.0), (1.0, 1.0)])
+def test_a_pi_controller_gets_no_derivative_for_another_scan(name: str, scans: tuple[float, float]) -> None:
+    target, options = TARGETS[name]
+    found = convert(settings("generic/standard", K=2, Ti=20), target, options=options, scan=scans)
+    assert found.settings.algorithm().kd == 0
+    assert seen(found.settings, scans[1], 1) == pytest.approx([0.1], rel=1e-9)
+
+
+@pytest.mark.parametrize("Tf", [0.0, 0.05, 0.5])
+@pytest.mark.parametrize("scans", [(0.1, 1.0), (0.5, 2.0), (1.0, 1.0), (1.0, 0.1)])
+def test_a_lagged_difference_keeps_a_filter_that_leaves_its_derivative_work_to_do(scans: tuple[float, float], Tf: float) -> None:
+    found = convert(settings("generic/standard", K=2, Ti=20, Td=4, Tf=Tf), "advanced-pid/advanced-pid", scan=scans)
+    h = scans[1]
+    assert found.settings["Tf"].value >= 0.5 * h * (1 - 1e-9)
+    share = (h / found.settings["Tf"].value) / math.expm1(h / found.settings["Tf"].value)  # of kd that the rule leaves
+    assert share > 0.3
+    assert share * found.settings["Kd"].value == pytest.approx(8 - 2 * (scans[0] - h) / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("scans", [(1.0, 0.1), (0.1, 1.0), (0.2, 2.0)])
+@pytest.mark.parametrize("name", TARGETS)
+def test_intervals_ten_times_apart_are_converted_with_usable_numbers(name: str, scans: tuple[float, float]) -> None:
+    target, options = TARGETS[name]
+    source = settings("generic/standard", K=2, Ti=30, Td=5, Tf=2)
+    found = convert(source, target, options=options, scan=scans, emulate=True)
+    cost = found.certificate.scan_cost
+    assert cost is not None
+    assert found.certificate.headline.loop_band.max_deviation <= cost.uncompensated
+    gains = [abs(x) for x in (found.settings.algorithm().kp, found.settings.algorithm().ki, found.settings.algorithm().kd)]
+    assert all(0.3 * x < y < 3 * x for x, y in zip((2, 2 / 30, 10), gains, strict=True) if "lagged" not in name)
+    run = found.certificate.scan_by_scan
+    assert run is not None
+    assert run.scan == scans
+    assert not run.taken
+    assert any(f"{scans[0]:g} s and {scans[1]:g} s" in w for w in found.warnings)
+
+
+def test_an_exact_match_is_refused_where_the_scans_leave_none() -> None:
+    source = settings("generic/standard", K=2, Ti=20, Td=4, Tf=0.5)
+    with pytest.raises(ConversionRefusedError, match="no settings give the same law at these scan intervals and rules"):
+        convert(source, "generic/parallel", scan=(1.0, 0.5), match="exact")
+    assert convert(source, "generic/parallel", scan=1.0, match="exact").match == "exact"
+
+
+def test_setpoint_weights_are_those_of_the_sampled_path() -> None:
+    found = convert(settings("generic/standard", K=2, Ti=20, Td=4, Tf=0.5, b=0.6, c=0.2), "generic/parallel", scan=(1.0, 0.25))
+
+    def setpoint(s: Settings, h: float) -> list[float]:
+        controller = pidemu.Controller(s, h, output_limits=WIDE)
+        controller.rest(0.0, 0.0, 0.0)
+        pulse = np.zeros(2000)
+        pulse[0] = 1.0
+        g = np.diff(controller.run(pulse, np.zeros(2000)), prepend=0.0)
+        return [float(np.sum(g * (-np.arange(2000) * h) ** k)) / (h * math.factorial(k)) for k in range(3)]
+
+    assert setpoint(found.settings, 0.25) == pytest.approx(setpoint(found.source, 1.0), rel=1e-9)
+    assert found.settings["b"].value == pytest.approx(0.6, rel=1e-9)
