@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 from tests.conversion.support import Complex, Floats, continuous, needed, outputs

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
 from pidemu.settings import Settings, limits
 from pidemu.units import Role, from_canonical, parse_unit

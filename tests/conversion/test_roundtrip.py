@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.conversion.convert import Conversion
+from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings

@@ -22,7 +22,8 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.card.library import ENVIRONMENT
 from pidemu.certificate.models import Band
-from pidemu.conversion.convert import Conversion, convert
+from pidemu.conversion.convert import convert
+from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.loop.process import Process, parse_process
 from pidemu.loop.text import written
