@@ -19,7 +19,7 @@ _GRID: Final = 25
 _ROUNDS: Final = 16
 _SHRINK: Final = 0.45
 _POINTS: Final = 40
-_USELESS: Final = 0.99
+USELESS: Final = 0.99
 """Deviation from which settings are not worth offering."""
 _MARGIN: Final = 1e-9
 """Relative distance kept from a range's end, so that unit conversion does not step over it."""
@@ -75,7 +75,7 @@ def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
             best = (float(cost[i, j]), float(K[i, 0]), float(np.broadcast_to(ki, cost.shape)[i, 0]), float(Td[0, j]))
         center = [best[1], best[3] or center[1]]
         width = [x * _SHRINK for x in width]
-    if best is None or not best[0] < _USELESS:
+    if best is None or not best[0] < USELESS:
         return None
     _, K_best, ki_best, Td_best = best
     return Numbers(sign * K_best, sign * ki_best, sign * K_best * Td_best)

@@ -16,7 +16,7 @@ from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.closed_forms import ClosedForms
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
-from pidemu.conversion.nearest import nearest
+from pidemu.conversion.nearest import USELESS, nearest
 from pidemu.conversion.target import Target
 from pidemu.errors import ScanError, SettingError
 from pidemu.settings import Settings
@@ -183,7 +183,10 @@ class Solver:
             settings, how = self._at_scans(settings, match)
         if how != "low-frequency" or match is not None:
             return settings, how
-        return self._not_behind_the_textbook(settings)
+        settings, how = self._not_behind_the_textbook(settings)
+        if self.scans is None and self.deviation(settings) >= USELESS:
+            raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all")
+        return settings, how
 
     def _at_scans(self, settings: Settings, match: Match | None) -> tuple[Settings, Match]:
         """Return settings whose sampled, held law has the source's moments; where these are not nearer, the given ones."""
@@ -222,15 +225,15 @@ class Solver:
         return self.forms.through(solve, start or self.forms.solve(None)[0], at_scan, derivative=derivative)
 
     def _not_behind_the_textbook(self, settings: Settings) -> tuple[Settings, Match]:
-        """Return low-frequency settings, or in the rare case that the textbook rule is nearer in the loop band, what is nearest."""
-        own = self.deviation(settings)
+        """Return what is nearest in the loop band, where the textbook rule is nearer than these, or they are useless; else these."""
+        found: list[tuple[float, Match, Settings]] = [(self.deviation(settings), "low-frequency", settings)]
+        own = found[0][0] * (1 - _CLEARLY)
         with suppress(NoMatchError, SettingError):
             book = self.forms.weighted(self.forms.textbook_numbers())
-            if self.deviation(book) < own * (1 - _CLEARLY):
-                found: list[tuple[float, Match, Settings]] = [(self.deviation(book), "textbook", book)]
-                with suppress(SettingError):
-                    near = self._nearest()
-                    found.append((self.deviation(near), "constrained", near))
-                _, how, best = min(found, key=lambda f: f[0])
-                return best, how
-        return settings, "low-frequency"
+            found += [(self.deviation(book), "textbook", book)]
+        if own >= USELESS or found[-1][0] < own:
+            with suppress(SettingError):
+                near = self._nearest()
+                found += [(self.deviation(near), "constrained", near)]
+        _, how, best = min(found, key=lambda f: f[0] if f[1] == "low-frequency" else f[0] * (1 + _CLEARLY))
+        return best, how
