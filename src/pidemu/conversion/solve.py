@@ -225,7 +225,7 @@ class Solver:
         return self.forms.through(solve, start or self.forms.solve(None)[0], at_scan, derivative=derivative)
 
     def _not_behind_the_textbook(self, settings: Settings) -> tuple[Settings, Match]:
-        """Return what is nearest in the loop band, where the textbook rule is nearer than these, or they are useless; else these."""
+        """Return these or, where the textbook rule is nearer in the loop band or they are useless, what is nearest there."""
         found: list[tuple[float, Match, Settings]] = [(self.deviation(settings), "low-frequency", settings)]
         own = found[0][0] * (1 - _CLEARLY)
         with suppress(NoMatchError, SettingError):
