@@ -62,7 +62,7 @@ def drawn(data: st.DataObject) -> tuple[Settings, str]:
 
 
 @given(data=st.data(), scan=SCANS)
-@settings(max_examples=300)
+@settings(max_examples=160)
 def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
     data: st.DataObject, scan: tuple[float, float] | None
 ) -> None:
@@ -92,7 +92,7 @@ def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
 
 
 @given(data=st.data(), scan=SCANS)
-@settings(max_examples=250)
+@settings(max_examples=140)
 def test_no_conversion_is_farther_off_in_the_loop_band_than_the_textbook_rule(
     data: st.DataObject, scan: tuple[float, float] | None
 ) -> None:
@@ -124,7 +124,7 @@ def shown(s: Settings, w: float, h: float) -> complex:
 
 
 @given(data=st.data(), place=st.floats(0, 1))
-@settings(max_examples=120)
+@settings(max_examples=80)
 def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_the_band(data: st.DataObject, place: float) -> None:
     source, target = drawn(data)
     a = source.algorithm()

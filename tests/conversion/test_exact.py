@@ -143,7 +143,7 @@ GENERIC = (
     scan=st.floats(0.1, 5),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_the_verdict_at_the_scans_is_what_the_emulated_controllers_show(
     data: st.DataObject, names: tuple[str, str], scan: float, seed: int
 ) -> None:
