@@ -184,7 +184,8 @@ class Solver:
         if how != "low-frequency" or match is not None:
             return settings, how
         settings, how = self._not_behind_the_textbook(settings)
-        if self.scans is None and self.deviation(settings) >= USELESS:
+        notched = not self.forms.scaled.algorithm.kp  # integral and derivative alone cancel at one frequency: no measure there
+        if self.scans is None and not notched and self.deviation(settings) >= USELESS:
             raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all")
         return settings, how
 
