@@ -195,7 +195,9 @@ class TestScansTooLong:
 
     def test_the_sentence_then_says_so_and_gives_no_margins(self) -> None:
         short = replace(path(0.2, 1.0, 5.0), loop_band=Band(0.001, 0.3, 0.2, 1.0, 5.0, 0.1))  # 5/Ti is 0.5 rad/s
-        found = sentence(certificate(feedback_at_scan=short, setpoint_at_scan=path(0.1), scan_cost=ScanCost(0.3, 4.0, False, 0.2)))
+        found = sentence(
+            certificate(feedback_at_scan=short, setpoint_at_scan=path(0.1), scan_cost=ScanCost(0.3, 4.0, False, 0.2, cut=True))
+        )
         assert found.startswith("A scan interval is too long for this loop, whose integral time is 10 s: ")
         assert "margin" not in found
 

@@ -294,3 +294,20 @@ def test_setpoint_weights_are_those_of_the_sampled_path() -> None:
 
     assert setpoint(found.settings, 0.25) == pytest.approx(setpoint(found.source, 1.0), rel=1e-9)
     assert found.settings["b"].value == pytest.approx(0.6, rel=1e-9)
+
+
+def test_a_forward_rule_gets_a_filter_with_which_it_is_stable_at_the_scan() -> None:
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=30, Td=5, Tf=0.5)
+    options = {"FORM": "parallel", "IFormula": "ForwardEuler", "DFormula": "ForwardEuler"}
+    conversion = pidemu.convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options, emulate=False)
+    assert conversion.settings["Tf"].canonical >= 1.0  # 1 - h/Tf is the pole: below h it rings, below h/2 it is unstable
+    out = pidemu.Controller(conversion.settings, 1.0, output_limits=WIDE).run(50.0, 50.0 + (np.arange(60) >= 5))
+    steps = np.diff(out[7:])
+    assert np.all(steps < 0), "after its kick the output goes on falling with the integral, and does not ring"
+
+
+def test_a_filter_that_rings_is_named_among_the_warnings() -> None:
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=20, Td=4, Tf=0.5)
+    conversion = pidemu.convert(source, "modelica/limpid", scan=(0.5, 2.0), given={"Nd": 50}, emulate=False)
+    assert conversion.settings.algorithm().Tf < 1.0
+    assert any("a scan interval of 2 s is long for modelica/limpid" in w and "rings" in w for w in conversion.warnings)

@@ -256,3 +256,11 @@ def test_the_public_names_lead_here() -> None:
     assert pidemu.simulate is simulate
     assert pidemu.Process is Process
     assert pidemu.ProcessError is ProcessError
+
+
+def test_an_iae_that_no_sampling_can_show_is_not_a_number() -> None:
+    """The unfiltered derivative, 12 s, times 1/(s + 1) has gain 12 at high frequencies: sampled, it is unstable at any interval."""
+    settings = pidemu.load_card("generic/standard").settings(K=2, Ti=60, Td=6)
+    process = Process.from_lags(1, [1])
+    assert math.isnan(continuous_load_iae(settings, process))
+    assert not loop_figures(settings.law(1e-4), process).stable

@@ -140,8 +140,12 @@ def textbook_line(c: Conversion) -> str:
     return f"the textbook rule would deviate by {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band"
 
 
+def _four_digits(x: float) -> str:
+    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))
+
+
 def loop_rows(loop: LoopComparison) -> list[list[str]]:
     """Return the closed loop's figures: name, before, after."""
     both = (loop.source, loop.target)
-    rows = [[name, *(number(float(f"{getattr(x, attribute):.4g}")) for x in both)] for name, attribute in _LOOP_ROWS]
+    rows = [[name, *(_four_digits(getattr(x, attribute)) for x in both)] for name, attribute in _LOOP_ROWS]
     return [*rows, ["stable", *("yes" if x.stable else "NO" for x in both)]]

@@ -177,7 +177,8 @@ class LoopFigures:
     Ms, Mt : float
         Largest sensitivity and complementary sensitivity.
     iae : float
-        Integral of the absolute error after a load step of 1 % at the process input [% s]; infinite where the loop is unstable.
+        Integral of the absolute error after a load step of 1 % at the process input [% s]; infinite where the loop is unstable,
+        NaN where it could not be computed.
     """
 
     stable: bool
@@ -220,13 +221,18 @@ class ScanCost:
     compensated : bool
         Whether the settings make up for interval and rule.
     uncompensated : float
-        Largest deviation of the held, sampled controllers in the loop band with the settings of the continuous law.
+        Largest deviation of the held, sampled controllers in the loop band with the settings of the continuous law; with the
+        settings themselves where these are those of the textbook rule or constrained, which know nothing of scans. Infinite where
+        a filter would be unstable.
+    cut : bool
+        Whether half the scan rate lies within the loop band, and ends it.
     """
 
     at: float
     phase_deg: float
     compensated: bool
     uncompensated: float
+    cut: bool = False
 
 
 @dataclass(frozen=True, slots=True)

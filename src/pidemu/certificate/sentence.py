@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from pidemu.certificate.models import Certificate, Kick, LoopComparison
-
-_LEFT: Final = 0.99
-"""Share of the loop band above which nothing of it counts as lost."""
 
 
 def sentence(c: Certificate) -> str:
@@ -35,7 +31,7 @@ def _of_the_controllers(c: Certificate) -> str:
         other = "" if setpoint else f" Setpoint changes will look different{_kick(c.setpoint_kick_at_scan or c.setpoint_kick)}."
         return f"Against disturbances the two equations are the same, but {_emulated(c)}.{other}"
     band = c.headline.loop_band
-    if c.scan_cost is not None and c.loop is None and band.high < _LEFT * 5 / c.time_scale:
+    if c.scan_cost is not None and c.scan_cost.cut:
         return (
             f"A scan interval is too long for this loop, whose integral time is {c.time_scale:.3g} s: half the scan rate lies "
             "within the loop band, and the figures cover what is left of it. Expect to tune the loop again, slower."

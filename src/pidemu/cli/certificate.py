@@ -60,7 +60,8 @@ def print_conversion(c: Conversion, round_dials: bool) -> None:
     others = len(c.assumptions) - len(c.law_assumptions)
     if others:
         wrapped(
-            f"{others} more assumptions concern scan rules, limits and transfers: 'pidemu show' and --json list them.",
+            f"{others} more assumption{'s concern' if others > 1 else ' concerns'} scan rules, limits and transfers: 'pidemu show' "
+            "and --json list them.",
             "  ",
         )
 
@@ -70,9 +71,13 @@ def print_plan(plan: TransferPlan) -> None:
     heading("\nCut-over")
     for i, step in enumerate(plan.steps, 1):
         wrapped(step.do, f"  {i}. ")
-    click.echo(f"  the output then moves by {number(plan.bump)} % of span; without this, by {number(plan.without_plan)} %")
+    click.echo(f"  the output then moves by {_bump(plan.bump)} % of span; without this, by {_bump(plan.without_plan)} %")
     for note in plan.notes:
         wrapped(note, "  - ")
+
+
+def _bump(x: float) -> str:
+    return number(round(x, 9) + 0.0)
 
 
 def print_ranking(c: Conversion) -> None:

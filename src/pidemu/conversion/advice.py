@@ -138,6 +138,8 @@ def _scan(c: Conversion) -> Iterator[str]:
     cost = c.certificate.scan_cost
     if c.scan is None or cost is None:
         return
+    for what in c.settings.algorithm(scan=c.scan[1]).too_coarse(c.scan[1]):
+        yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
     now = c.certificate.headline.loop_band.max_deviation
     if c.scan[0] != c.scan[1]:
         change = "costs" if cost.phase_deg > 0 else "gains"

@@ -66,6 +66,17 @@ class Attempt:
         """The verdict by the linear figures; ``refused`` where there are none."""
         return "refused" if self.certificate is None else self.certificate.verdict
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values for JSON."""
+        c = self.certificate
+        paths = {} if c is None else {"feedback": c.headline, "setpoint": c.setpoint_at_scan or c.setpoint}
+        return {
+            "changed": dict(self.changed),
+            "verdict": self.verdict,
+            "rules_differ": self.rules_differ,
+            **{name: path.loop_band.max_deviation for name, path in paths.items()},
+        }
+
     @cached_property
     def rank(self) -> tuple[Any, ...]:
         """What the choices are ordered by: given dials in use, verdict, scan rules, nonlinear options, both paths, changes."""

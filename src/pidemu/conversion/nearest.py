@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from pidemu.law import Law, at_frequencies, paths
 from pidemu.settings import limits
 from pidemu.units import Role, parse_unit, to_canonical
 
+if TYPE_CHECKING:
+    from pidemu.loop.process import Process
+
 _GRID: Final = 25
 _ROUNDS: Final = 16
 _SHRINK: Final = 0.45
@@ -25,7 +28,7 @@ _MARGIN: Final = 1e-9
 """Relative distance kept from a range's end, so that unit conversion does not step over it."""
 
 
-def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
+def nearest(law: Law, target: Target, factor: float, process: Process | None = None) -> Numbers | None:
     """Return numbers inside the target's ranges that minimise the largest deviation over the loop band.
 
     The low-frequency gain ``m0`` is kept as far as the ranges allow. The search is a grid in the logarithms of gain and derivative
@@ -39,13 +42,15 @@ def nearest(law: Law, target: Target, factor: float) -> Numbers | None:
         The target; its filter stays as it is.
     factor : float
         What the source's gain is multiplied by for new signal ranges.
+    process : Process, optional
+        The process, which places the end of the loop band.
 
     Returns
     -------
     Numbers or None
         ``None`` where the deviation of all is near 1 or above, that is, where no controller at all would be as near.
     """
-    (low, high), _ = bands(law, None)
+    (low, high), _ = bands(law, None, process)
     w = np.geomspace(low, high, _POINTS)
     wanted = factor * law.response(w)
     m0, m1, m2 = (factor * m for m in law.moments())

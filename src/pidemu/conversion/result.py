@@ -144,6 +144,7 @@ class Conversion:
             "verdict": self.verdict,
             "sentence": self.sentence,
             "chosen": dict(self.chosen),
+            "ranking": [attempt.to_dict() for attempt in self.ranking],
             "certificate": self.certificate.to_dict(),
             "textbook": {
                 "to": self.textbook.settings.to_dict() if self.textbook.settings else None,

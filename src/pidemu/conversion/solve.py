@@ -8,6 +8,8 @@ from contextlib import suppress
 from copy import copy
 from typing import TYPE_CHECKING
 
+from pidemu.algorithm import Algorithm
+from pidemu.card.base import Rule
 from pidemu.certificate.linear import bands, certify, deviation, scan_phase
 from pidemu.certificate.models import EXACT, Certificate, ScanCost
 from pidemu.certificate.scanwise import common_interval
@@ -17,7 +19,7 @@ from pidemu.conversion.closed_forms import ClosedForms
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
 from pidemu.conversion.nearest import USELESS, nearest
-from pidemu.conversion.target import Target
+from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import ScanError, SettingError
 from pidemu.settings import Settings
 
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
 _FILTER_ROUNDS = 12
+_WHOLE = 0.99
+"""Share of the loop band above which nothing of it counts as lost."""
+_LEAST = {Rule.TRAPEZOIDAL: 0.5, Rule.FORWARD: 1.0, Rule.LAGGED_DIFFERENCE: 0.5}
+"""Filter time in scan intervals below which a rule rings, or hardly leaves a derivative."""
 _CLEARLY = 1e-6
 """Relative amount by which a deviation must be smaller to count."""
 
@@ -132,12 +138,13 @@ class Solver:
         """Return what the scan intervals cost, with the settings of the continuous law and with these, that were found so."""
         if self.scans is None:
             return None
-        end = bands(self.law, max(self.scans), self.process)[0][1]
+        end, whole = (bands(self.law, h, self.process)[0][1] for h in (max(self.scans), None))
         plain = settings
         if how not in ("textbook", "constrained"):  # these know nothing of scans
             with suppress(NoMatchError, SettingError):
                 plain = self._continuous().closed(None)[0]
-        return ScanCost(end, scan_phase(end, self.scans), plain != settings, self.deviation(plain))
+        cost = self._deviation_if_stable(plain)
+        return ScanCost(end, scan_phase(end, self.scans), plain != settings, cost, cut=end < _WHOLE * whole)
 
     def _continuous(self) -> Solver:
         """Return the solver of the same conversion without compensation."""
@@ -147,7 +154,9 @@ class Solver:
 
     def _nearest(self) -> Settings:
         idle = not self.forms.scaled.algorithm.kp and self.target.has_proportional
-        numbers = None if idle else nearest(self.law, self.target, self.factor)  # nothing imitates a missing proportional term
+        numbers = (
+            None if idle else nearest(self.law, self.target, self.factor, self.process)
+        )  # nothing imitates a missing proportional term
         if numbers is None:
             raise SettingError("no settings come near")
         return self.forms.weighted(numbers)
@@ -179,7 +188,7 @@ class Solver:
             There is none, or it leaves the target's ranges.
         """
         settings, how = self.forms.solve(match)
-        if self.compensates and self.certify(settings).verdict != "exact":
+        if self.compensates and not self._runs_exactly(settings):
             settings, how = self._at_scans(settings, match)
         if how != "low-frequency" or match is not None:
             return settings, how
@@ -193,7 +202,7 @@ class Solver:
         """Return settings whose sampled, held law has the source's moments; where these are not nearer, the given ones."""
         with suppress(NoMatchError, SettingError, ScanError):
             bent = self._through(self._met, settings, derivative=bool(self.forms.scaled.algorithm.kd))
-            if self.deviation(bent) < self.deviation(settings) * (1 - _CLEARLY):
+            if self.deviation(bent) < self._deviation_if_stable(settings) * (1 - _CLEARLY):
                 settings = bent
         if self.certify(settings).headline.is_exact:
             return settings, "exact"
@@ -201,22 +210,55 @@ class Solver:
             raise NoMatchError("no settings give the same law at these scan intervals and rules")
         return settings, "low-frequency"
 
-    def _met(self, problem: Problem, _start: Sequence[float]) -> Sequence[float]:
+    def _runs_exactly(self, settings: Settings) -> bool:
+        try:
+            return self.certify(settings).verdict == "exact"
+        except ScanError:
+            return False
+
+    def _deviation_if_stable(self, settings: Settings) -> float:
+        """Return the deviation; infinite where a filter is unstable at the scan interval."""
+        try:
+            return self.deviation(settings)
+        except ScanError:
+            return math.inf
+
+    def _met(self, problem: Problem, start: Sequence[float]) -> Sequence[float]:
         """Return moments that `meet` the source's, with a free filter set so that the next moment agrees too, as far as it can."""
+        if self.filter_is_free:
+            self._start_with_a_usable_filter(problem.numbers(start), problem.scan)
         asked = meet(problem)
         for _ in range(_FILTER_ROUNDS if self.filter_is_free else 0):
-            law = problem.law(asked)
+            law, kept = problem.law(asked), self.target.filter
             kd, Tf = law.algorithm.kd, law.algorithm.Tf
             if not kd:
                 break
             apart = law.held_expansion(4)[3] - problem.wanted.held_expansion(4)[3]
-            least = 0.5 * (problem.scan or 0.0) if self.target.filter.needed else 0.0  # below it hardly anything is left
-            wanted = max(least, Tf + apart / kd)  # m3 holds -kd Tf
-            self.target.filter = self.target.filter.nearest_to(wanted, self.target.filter_base(problem.numbers(asked)))
-            asked = meet(problem)
+            wanted = self._usable(Tf + apart / kd, law.algorithm, law.scan)  # m3 holds -kd Tf
+            try:
+                self.target.filter = kept.nearest_to(wanted, self.target.filter_base(problem.numbers(asked)))
+                asked = meet(problem)
+            except NoMatchError:
+                self.target.filter = kept
+                break
             if abs(wanted - Tf) <= _CLEARLY * wanted:
                 break
         return asked
+
+    def _start_with_a_usable_filter(self, numbers: Numbers, scan: float | None) -> None:
+        a = self.target.algorithm_of(numbers)
+        if a.kd:
+            usable = self._usable(a.Tf, a, scan)
+            self.target.filter = self.target.filter.nearest_to(usable, self.target.filter_base(numbers))
+
+    def _usable(self, Tf: float, a: Algorithm, scan: float | None) -> float:
+        """Return a filter time [s] or, where its rule would ring or leave hardly a derivative, the nearest at which it does not."""
+        least = _LEAST.get(a.derivative_rule if a.filter_on == "term" else a.filter_rule, 0.0) * (scan or 0.0)
+        if Tf >= least:
+            return max(Tf, 0.0)
+        f = self.target.filter
+        can_be_off = not f.needed and f.kind != "gain" and f.low <= 0
+        return 0.0 if can_be_off and Tf < least / 2 else least
 
     def _through(self, solve: Way, start: Settings | None = None, *, derivative: bool = True) -> Settings:
         """Return settings found by way of their moments; as a process sees them, where scans count."""

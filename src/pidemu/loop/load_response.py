@@ -66,13 +66,18 @@ def load_iae(settings: Settings, process: Process, scan: float | None = None, fa
 def continuous_load_iae(settings: Settings, process: Process, factor: float = 1.0) -> float:
     """Return the same for the continuous law, without sampling.
 
-    Two short scan intervals are extrapolated to none; the backward rule stands for all, which then are alike.
+    Two short scan intervals are extrapolated to none; the backward rule stands for all, which then are alike. NaN where the loop is
+    stable, but not with any scan interval: with an unfiltered derivative whose gain, times the process's at high frequencies, is 1
+    or more.
     """
     law = settings.law()
     if not loop_figures(law, process, factor).stable:
         return math.inf
     h = time_scale(law, process, factor) / _FINE
-    long, short = (_iae(Law(_as_continuous(law.algorithm), t), process, factor, True) for t in (h, h / 2))
+    fine = [Law(_as_continuous(law.algorithm), t) for t in (h, h / 2)]
+    if not all(loop_figures(x, process, factor).stable for x in fine):
+        return math.nan
+    long, short = (_iae(x, process, factor, True) for x in fine)
     return 2 * short - long if math.isfinite(long) else math.inf
 
 
