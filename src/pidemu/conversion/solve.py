@@ -153,10 +153,9 @@ class Solver:
         return Solver(self.source, target, self.factor, self.scans, self.process, compensate=False)
 
     def _nearest(self) -> Settings:
+        # nothing imitates a missing proportional term
         idle = not self.forms.scaled.algorithm.kp and self.target.has_proportional
-        numbers = (
-            None if idle else nearest(self.law, self.target, self.factor, self.process)
-        )  # nothing imitates a missing proportional term
+        numbers = None if idle else nearest(self.law, self.target, self.factor, self.process)
         if numbers is None:
             raise SettingError("no settings come near")
         return self.forms.weighted(numbers)
@@ -273,10 +272,10 @@ class Solver:
         own = found[0][0] * (1 - _CLEARLY)
         with suppress(NoMatchError, SettingError):
             book = self.forms.weighted(self.forms.textbook_numbers())
-            found += [(self.deviation(book), "textbook", book)]
+            found += [(self._deviation_if_stable(book), "textbook", book)]
         if own >= USELESS or found[-1][0] < own:
             with suppress(SettingError):
                 near = self._nearest()
-                found += [(self.deviation(near), "constrained", near)]
+                found += [(self._deviation_if_stable(near), "constrained", near)]
         _, how, best = min(found, key=lambda f: f[0] if f[1] == "low-frequency" else f[0] * (1 + _CLEARLY))
         return best, how
