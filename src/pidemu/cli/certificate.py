@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING
 import click
 
 from pidemu.card.load import Card
-from pidemu.certificate.figures import BAND_COLUMNS, band_rows, emulation_line, kick_line, loop_rows, rounding_line, textbook_line
-from pidemu.certificate.figures import decibels as _db
-from pidemu.certificate.figures import degrees as _deg
-from pidemu.certificate.figures import other_units as _other_units
-from pidemu.certificate.figures import percent as _percent
-from pidemu.certificate.figures import unit_of as _unit
+from pidemu.certificate.figures import (
+    BAND_COLUMNS,
+    band_rows,
+    decibels,
+    degrees,
+    emulation_line,
+    kick_line,
+    loop_rows,
+    other_units,
+    percent,
+    rounding_line,
+    textbook_line,
+    unit_of,
+)
 from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.choices import Attempt
@@ -37,8 +45,8 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     click.echo("nearest settings, which 'pidemu convert --allow-approximate' gives:", err=True)
     for name, value in nearest.settings.items():
         if value.active:
-            click.echo(f"  {name} = {number(value.value)} {_unit(value)}".rstrip(), err=True)
-    click.echo(f"their cost: up to {_percent(band.max_deviation)}, {_db(band)}, {_deg(band)} in the loop band", err=True)
+            click.echo(f"  {name} = {number(value.value)} {unit_of(value)}".rstrip(), err=True)
+    click.echo(f"their cost: up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band", err=True)
 
 
 def print_conversion(c: Conversion, round_dials: bool) -> None:
@@ -92,7 +100,7 @@ def _ranked(a: Attempt) -> list[str]:
         return [changes, "refused", "-", "-"]
     setpoint = a.certificate.setpoint_at_scan or a.certificate.setpoint
     verdict = f"{a.verdict}, scan rules differ" if a.rules_differ else a.verdict
-    return [changes, verdict, *(_percent(p.loop_band.max_deviation) for p in (a.certificate.headline, setpoint))]
+    return [changes, verdict, *(percent(p.loop_band.max_deviation) for p in (a.certificate.headline, setpoint))]
 
 
 def _loop(loop: LoopComparison) -> None:
@@ -103,7 +111,9 @@ def _loop(loop: LoopComparison) -> None:
 def _side(title: str, s: Settings) -> None:
     heading(f"\n{title}: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
     rows = [
-        [name, number(v.value), _unit(v), _other_units(v), "" if v.given else "card's default"] for name, v in s.items() if v.active
+        [name, number(v.value), unit_of(v), other_units(v), "" if v.given else "card's default"]
+        for name, v in s.items()
+        if v.active
     ]
     table(["", "", "", "", ""], rows, right=(1,))
 
@@ -117,7 +127,7 @@ def _target(c: Conversion) -> None:
     for name, v in s.items():
         if v.active:
             rule = number(book[name].value) if book is not None and name in book else "-"
-            rows.append([name, number(v.value), _unit(v), _other_units(v), rule])
+            rows.append([name, number(v.value), unit_of(v), other_units(v), rule])
     table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pidemu.algorithm import Algorithm
 from pidemu.card.base import Form
 from pidemu.certificate.linear import certify
-from pidemu.certificate.models import EXACT, RANK
+from pidemu.certificate.models import EXACT, RANK, Certificate
 from pidemu.conversion import match as closed
 from pidemu.conversion.aim import Match
 from pidemu.conversion.match import NoMatchError
@@ -96,12 +96,12 @@ class ClosedForms:
         K = a.kp or (gain.canonical if gain is not None else 0.0)
         with suppress(SettingError):
             settings = self.weighted(Numbers(K, a.ki, self._dial_kd(), a.Tf if self.target.filter.free else None))
-            verdict = self._continuous_verdict(settings)
+            verdict = self._certify(settings).verdict
             return None if verdict == "approximate" else (verdict, settings)
         return None
 
-    def _continuous_verdict(self, settings: Settings) -> str:
-        return certify(self.law, settings.law(), None, self.factor).verdict
+    def _certify(self, settings: Settings) -> Certificate:
+        return certify(self.law, settings.law(), None, self.factor)
 
     def _matches(self, match: Match | None) -> tuple[Settings, Match]:
         why: NoMatchError | SettingError | None = None
@@ -116,14 +116,14 @@ class ClosedForms:
             settings = self._low_frequency()
         except (NoMatchError, SettingError) as error:
             raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
-        how: Match = "exact" if certify(self.law, settings.law(), None, self.factor).feedback.is_exact else "low-frequency"
+        how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
         if match == "exact" and how != "exact":
             raise NoMatchError("its filter is fixed, and no settings give the same law")
         return settings, how
 
     def _proven(self, settings: Settings) -> Settings:
         """Refuse an exact match that is none: whatever the card says of its terms, the law decides."""
-        if certify(self.law, settings.law(), None, self.factor).feedback.full_band.max_deviation > _ROUNDING:
+        if self._certify(settings).feedback.full_band.max_deviation > _ROUNDING:
             raise NoMatchError("no settings give the same law")
         return settings
 
@@ -204,7 +204,7 @@ class ClosedForms:
             except SettingError as error:
                 refused = refused or error
                 continue
-            rank = RANK[self._continuous_verdict(settings)]
+            rank = RANK[self._certify(settings).verdict]
             if i == 0 or rank < RANK["approximate"]:
                 found.append((rank, settings))
         if not found:

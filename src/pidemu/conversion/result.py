@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.certificate.models import Certificate, Verdict
@@ -97,7 +98,7 @@ class Conversion:
         """The verdict in one sentence for whoever stands at the loop."""
         return sentence(self.certificate)
 
-    @property
+    @cached_property
     def setpoint_filter(self) -> SetpointFilter | None:
         """The setpoint filter that would make the setpoint paths agree; ``None`` where they do, or where no filter can."""
         return setpoint_filter(self.source.law(), self.settings.law(), self.factor)

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 from pidemu.card.library import load_card
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.convert import convert
+from pidemu.conversion.request import Request
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
@@ -223,5 +224,5 @@ def _command(work: Work, settings: Settings, source: str, target: str, held: Map
     """Return the command line of this conversion."""
     values = [f"{n}={v.value:.15g}" for n, v in settings.items() if v.given and v.value != v.setting.default]
     words = ["pidemu", "convert", work.names[source], *values, *(f"{n}={c}" for n, c in _changed(settings).items())]
-    words += ["--to", work.names[target], *(w for n, x in held.items() for w in ("--set", f"{n}={x:g}"))]
+    words += ["--to", work.names[target], *Request(given=held).words()]
     return shlex.join([*words, *(w for folder in work.vendors for w in ("--vendors", folder))])

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
 
 from pidemu.conversion.result import Conversion
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.report.contents import Contents
-
-if TYPE_CHECKING:
-    from jinja2 import Template
-
-_TEMPLATE: Final = "certificate.html.j2"
+from pidemu.report.pages import template, write
 
 
 def certificate_page(conversion: Conversion, plan: TransferPlan | None = None) -> str:
@@ -37,7 +31,8 @@ def certificate_page(conversion: Conversion, plan: TransferPlan | None = None) -
     PidemuError
         Matplotlib or Jinja is not installed.
     """
-    return _template().render(page=Contents(conversion, plan))
+    _check_extra()
+    return template("certificate.html.j2").render(page=Contents(conversion, plan))
 
 
 def write_page(path: str | Path, conversion: Conversion, plan: TransferPlan | None = None) -> None:
@@ -57,20 +52,13 @@ def write_page(path: str | Path, conversion: Conversion, plan: TransferPlan | No
     """
     if Path(path).suffix.lower() != ".html":
         raise PidemuError(f"{path}: the certificate is written as .html; give the file this ending")
-    page = certificate_page(conversion, plan)
-    try:
-        Path(path).write_text(page, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise PidemuError(f"{path}: cannot be written: {error.strerror}") from None
+    write(path, certificate_page(conversion, plan))
 
 
-def _template() -> Template:
+def _check_extra() -> None:
     try:
-        import jinja2
+        import jinja2  # noqa: F401
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
         name = "Jinja" if (error.name or "").startswith("jinja2") else "matplotlib"
         raise PidemuError(f"the page needs {name}, which is not installed; pip install 'pidemu[report]'") from None
-    text = resources.files("pidemu.report").joinpath(_TEMPLATE).read_text(encoding="utf-8")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(text)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import bisect
 import os
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -19,6 +18,7 @@ from pidemu.errors import PidemuError
 from pidemu.matrix.cell import Cell, percent
 from pidemu.matrix.matrix import Matrix, counts, matrix
 from pidemu.matrix.typical import DERIVATIVE_TIME, GAIN, INTEGRAL_TIME
+from pidemu.report.pages import template, write
 
 DOCS: Final = Path(__file__).resolve().parents[3] / "docs"
 STEPS: Final = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
@@ -63,12 +63,8 @@ def page(m: Matrix, folder: str | Path) -> str:
         jinja2 is not installed.
     """
     check_page()
-    import jinja2
-
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string(files("pidemu.report").joinpath("matrix.html.j2").read_text(encoding="utf-8"))
     cards = [_card(m, i, Path(folder)) for i in range(len(m.cards))]
-    text: str = template.render(
+    text: str = template("matrix.html.j2").render(
         m=m, cards=cards, counts=counts(m.cells), steps=_legend(), settings=typical_words(derivative=m.derivative),
         shade=shade, percent=percent, number=_number, command=lambda c: c.command.split(" --to ", 1),
     )  # fmt: skip
@@ -83,11 +79,7 @@ def write_page(file: str | Path, m: Matrix) -> None:
     PidemuError
         The file cannot be written, or jinja2 is not installed.
     """
-    text = page(m, Path(file).parent)
-    try:
-        Path(file).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise PidemuError(f"{file}: cannot be written: {error.strerror}") from None
+    write(file, page(m, Path(file).parent))
 
 
 def shade(cell: Cell) -> str:
