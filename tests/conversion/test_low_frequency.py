@@ -219,3 +219,11 @@ def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_a_sine(
     assert abs(shown - 1) == pytest.approx(band.max_deviation, abs=error)
     assert abs(math.log(abs(shown))) <= band.gain_db * math.log(10) / 20 + error
     assert abs(math.atan2(shown.imag, shown.real)) <= math.radians(band.phase_deg) + error
+
+
+def test_a_controller_without_derivative_gets_no_filter_out_of_rounding() -> None:
+    source = pidemu.load_card("generic/standard").settings(K=24.999999999999993, Ti=1, Tf=2)  # its m2 is 0, but for rounding
+    assert 0 < abs(source.law().moments()[2]) < 1e-12
+    conversion = pidemu.convert(source, "generic/parallel", match="low-frequency", emulate=False)
+    assert (conversion.settings["kd"].value, conversion.settings["Tf"].value) == (0, 0)
+    assert conversion.settings.law().moments() == pytest.approx((25, 25, 0), rel=1e-12, abs=1e-12)

@@ -217,7 +217,8 @@ class ClosedForms:
 
     def _wanted_filter(self) -> tuple[float, float]:
         """Return the filter time that the next moment asks for, and the derivative time it goes with [s]."""
-        _, m1, m2, m3 = self.scaled.expansion(4)
+        *moments, m3 = self.scaled.expansion(4)
+        _, m1, m2 = closed.without_rounding(moments)
         if m2 == 0:
             return 0.0, 0.0
         plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"

@@ -110,6 +110,12 @@ def _clean(difference: float, scale: float) -> float:
     return 0.0 if abs(difference) <= _ROUNDING * abs(scale) else difference
 
 
+def without_rounding(moments: Sequence[float]) -> tuple[float, float, float]:
+    """Return the moments with an ``m2`` that is only the rounding of its neighbours made zero."""
+    m0, m1, m2 = moments
+    return m0, m1, _clean(m2, abs(m1 * m1 / m0) if m0 else abs(m2))
+
+
 def _leads(n0: float, n1: float, n2: float) -> tuple[float, ...]:
     """Return the time constants that ``n0 + n1 s + n2 s^2`` is factored into, the smaller first: derivative times of a series form.
 
@@ -185,8 +191,7 @@ def low_frequency(moments: Sequence[float], target: Target, filt: TargetFilter) 
     NoMatchError
         There are none.
     """
-    m0, m1, m2 = moments
-    m2 = _clean(m2, abs(m1 * m1 / m0) if m0 else abs(m2))
+    m0, m1, m2 = without_rounding(moments)
     if not target.has_proportional:
         return (_without_proportional(m0, m2, target, target.idle_gain),)
     if not target.has_derivative:
