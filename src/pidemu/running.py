@@ -67,7 +67,7 @@ class Running:
                 raise ScanError(
                     f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
                 )
-            found = self._others[h] = compiled(program, like=(self.program, self.compiled))
+            found = self._others[h] = compiled(program)
         return found
 
     def reset(self) -> None:

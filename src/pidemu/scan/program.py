@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Operator = Literal["+", "-", "*", "/", "<", ">", "<=", ">=", "==", "!=", "and", "or"]
 
 
 class Expr:
-    """A value computed within one scan; operators build larger ones."""
+    """A value computed within one scan; operators build larger ones. Expressions are equal where they are written alike."""
 
     __slots__ = ()
-    __hash__ = object.__hash__
 
     def __add__(self, other: Operand) -> Expr:
         return Binary("+", self, expr(other))
@@ -59,21 +58,21 @@ class Expr:
         return Binary("or", self, other)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Number(Expr):
     """A constant of the program text."""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Name(Expr):
     """An input, a coefficient, a state or an earlier assignment."""
 
     id: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Binary(Expr):
     """Two operands."""
 
@@ -82,7 +81,7 @@ class Binary(Expr):
     right: Expr
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Select(Expr):
     """``yes`` where ``condition`` holds, else ``no``."""
 
@@ -91,11 +90,22 @@ class Select(Expr):
     no: Expr
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Floor(Expr):
     """The largest whole number that is not above the operand."""
 
     operand: Expr
+
+
+Precision = Literal["float64", "float32"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cast(Expr):
+    """The operand rounded to a precision, or a number of the program text in that precision."""
+
+    operand: Expr
+    precision: Precision
 
 
 Operand = Expr | float | int
@@ -112,7 +122,7 @@ def select(condition: Expr, yes: Operand, no: Operand) -> Expr:
 
 
 def equal(left: Operand, right: Operand) -> Expr:
-    """Return whether two values are equal (``==`` compares the expressions themselves)."""
+    """Return whether two values are equal (``==`` tells whether two expressions are written alike)."""
     return Binary("==", expr(left), expr(right))
 
 
@@ -127,22 +137,8 @@ def names_in(x: Expr) -> Iterator[str]:
         case Binary(left=left, right=right):
             yield from names_in(left)
             yield from names_in(right)
-        case Floor(operand=operand):
+        case Floor(operand=operand) | Cast(operand=operand):
             yield from names_in(operand)
-
-
-def has_literal(x: Expr) -> bool:
-    """Tell whether an arithmetic operation of an expression has a number of the program text as operand."""
-    match x:
-        case Select(condition=condition, yes=yes, no=no):
-            return any(has_literal(part) for part in (condition, yes, no))
-        case Binary(operator="+" | "-" | "*" | "/", left=left, right=right):
-            return isinstance(left, Number) or isinstance(right, Number) or has_literal(left) or has_literal(right)
-        case Binary(left=left, right=right):
-            return has_literal(left) or has_literal(right)
-        case Floor(operand=operand):
-            return has_literal(operand)
-    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +180,67 @@ class Assign:
 
 
 @dataclass(frozen=True, slots=True)
+class Line:
+    """A delay line: under its name a scan reads what another name held at the end of an earlier scan, and 0 before that.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the program; it is only read.
+    text : str
+        What it is.
+    unit : str
+        Its unit.
+    source : str
+        The name whose value enters the line at the end of every scan.
+    """
+
+    name: str
+    text: str
+    unit: str
+    source: str
+
+
+class Structure(NamedTuple):
+    """What programs have in common that differ in numbers only: they share compiled code."""
+
+    inputs: tuple[str, ...]
+    coefficients: tuple[str, ...]
+    states: tuple[str, ...]
+    lines: tuple[tuple[str, str], ...]
+    body: tuple[tuple[str, Expr], ...]
+    recorded: tuple[str, ...]
+    precision: Precision
+    wide_literals: bool
+    wide: frozenset[str]
+
+    def bare(self) -> Program:
+        """Return a program of this structure without texts, its numbers all zero."""
+        return Program(
+            title="",
+            inputs=_bare(self.inputs),
+            coefficients=_bare(self.coefficients),
+            values=(0.0,) * len(self.coefficients),
+            states=_bare(self.states),
+            initial=(0.0,) * len(self.states),
+            body=tuple(Assign(name, value, "") for name, value in self.body),
+            output=self.recorded[0],
+            precision=self.precision,
+            wide_literals=self.wide_literals,
+            wide=self.wide,
+            lines=tuple(Line(name, "", "", source) for name, source in self.lines),
+            lengths=(1,) * len(self.lines),
+            also=self.recorded[1:],
+        )
+
+
+def _bare(names: tuple[str, ...]) -> tuple[Quantity, ...]:
+    return tuple(Quantity(name, "", "") for name in names)
+
+
+@dataclass(frozen=True, slots=True)
 class Program:
-    """What one controller does in one scan.
+    """What one controller, or one closed loop, does in one scan.
 
     Attributes
     ----------
@@ -211,6 +266,14 @@ class Program:
         What every operation is rounded to.
     wide_literals : bool
         With float32: numbers of the program text are float64, and so is what is computed with them until it is assigned.
+    wide : frozenset of str
+        With float32: names that are float64 all the same, those of the process in a closed loop.
+    lines : tuple of Line
+        Delay lines.
+    lengths : tuple of int
+        How many scans each of them delays by, at least 1.
+    also : tuple of str
+        Names that a run records besides the output.
     """
 
     title: str
@@ -221,5 +284,33 @@ class Program:
     initial: tuple[float, ...]
     body: tuple[Assign, ...]
     output: str = "u"
-    precision: Literal["float64", "float32"] = "float64"
+    precision: Precision = "float64"
     wide_literals: bool = False
+    wide: frozenset[str] = frozenset()
+    lines: tuple[Line, ...] = ()
+    lengths: tuple[int, ...] = ()
+    also: tuple[str, ...] = ()
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """The names whose values a run returns for every scan, the output first."""
+        return (self.output, *self.also)
+
+    @property
+    def structure(self) -> Structure:
+        """What the program shares with others that differ in their numbers only."""
+        return Structure(
+            tuple(q.name for q in self.inputs),
+            tuple(q.name for q in self.coefficients),
+            tuple(q.name for q in self.states),
+            tuple((line.name, line.source) for line in self.lines),
+            tuple((assign.name, assign.value) for assign in self.body),
+            self.recorded,
+            self.precision,
+            self.wide_literals,
+            self.wide,
+        )
+
+    def is_wide(self, name: str) -> bool:
+        """Tell whether a name holds a float64 number."""
+        return self.precision == "float64" or name in self.wide

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import CodeType
 from typing import Any, Final
 
-from pidemu.scan.program import Binary, Expr, Floor, Name, Number, Program, Select, has_literal, names_in
+from pidemu.scan.precision import explicit
+from pidemu.scan.program import Binary, Cast, Expr, Floor, Name, Number, Program, Select, Structure, names_in
 from pidemu.scan.specialise import specialise
 
 _PRECEDENCE: Final = {
@@ -29,36 +29,13 @@ def _literal(value: float) -> str:
     return repr(value) if math.isfinite(value) else f'float("{value!r}")'
 
 
-def _number(program: Program, value: float) -> str:
-    """Return a coefficient or an initial value, in the program's precision."""
-    return _literal(value) if program.precision == "float64" else f"float32({_literal(value)})"
+def _number(program: Program, name: str, value: float) -> str:
+    """Return a coefficient or an initial value, in its name's precision."""
+    return _literal(value) if program.precision == "float64" else f"{_precision(program, name)}({_literal(value)})"
 
 
-def _assigned(program: Program, x: Expr) -> str:
-    """Return the right side of an assignment.
-
-    A float32 program runs on float32 numbers, and plain numbers in its text give way to them, so every operation is rounded. Wide
-    literals are float64 numbers, which do not give way: what is computed with them is rounded when it is assigned.
-    """
-    if program.precision == "float64":
-        return render(x)
-    if program.wide_literals and has_literal(x):
-        return f"float32({render(_widened(x))})"
-    return f"float32({render(x)})" if isinstance(x, Number) else render(x)
-
-
-def _widened(x: Expr) -> Expr:
-    """Return the expression with ``float64(...)`` around the numbers that it computes with."""
-    match x:
-        case Number(value=value):
-            return Name(f"float64({_literal(value)})")
-        case Select(condition=condition, yes=yes, no=no):
-            return Select(_widened(condition), _widened(yes), _widened(no))
-        case Binary(operator=operator, left=left, right=right):
-            return Binary(operator, _widened(left), _widened(right))
-        case Floor(operand=operand):
-            return Floor(_widened(operand))
-    return x
+def _precision(program: Program, name: str) -> str:
+    return "float64" if program.is_wide(name) else "float32"
 
 
 def _render(x: Expr) -> tuple[str, int]:
@@ -70,14 +47,21 @@ def _render(x: Expr) -> tuple[str, int]:
         case Select(condition=condition, yes=yes, no=no):
             test, then = (_wrapped(part, 1) for part in (condition, yes))
             return f"{then} if {test} else {_wrapped(no, _SELECT)}", _SELECT
+        case Cast(operand=operand, precision=precision):
+            return f"{precision}({_render(operand)[0]})", _ATOM
         case Binary(operator=operator, left=left, right=right):
             level = _PRECEDENCE[operator]
             compares = level == _PRECEDENCE["<"]  # Python chains comparisons: a < b < c is not (a < b) < c
             before, after = level + compares, level + (level > _PRECEDENCE["and"])
-            return f"{_wrapped(left, before)} {operator} {_wrapped(right, after)}", level
+            return f"{_wrapped(_weak(left), before)} {operator} {_wrapped(_weak(right), after)}", level
         case Floor(operand=operand):
             return f"{_wrapped(operand, _PRECEDENCE['*'])} // 1.0", _PRECEDENCE["/"]
     raise TypeError(f"no Python for {type(x).__name__}")
+
+
+def _weak(x: Expr) -> Expr:
+    """Return an operand; a plain number gives way to a float32 one by itself."""
+    return x.operand if isinstance(x, Cast) and isinstance(x.operand, Number) and x.precision == "float32" else x
 
 
 def _wrapped(x: Expr, least: int) -> str:
@@ -87,22 +71,28 @@ def _wrapped(x: Expr, least: int) -> str:
 
 def _body(program: Program, indent: str) -> list[str]:
     lines = []
-    for assign in program.body:
-        code = f"{indent}{assign.name} = {_assigned(program, assign.value)}"
+    for assign in explicit(program):
+        code = f"{indent}{assign.name} = {render(assign.value)}"
         lines.append(f"{code:<64}  # {assign.text}")
     return lines
 
 
 def _rounded_inputs(program: Program, indent: str) -> list[str]:
-    if program.precision == "float64":
-        return []
-    names = ", ".join(q.name for q in program.inputs)
-    return [f"{indent}{names} = {', '.join(f'float32({q.name})' for q in program.inputs)}"]
+    narrow = [q.name for q in program.inputs if not program.is_wide(q.name)]
+    return [f"{indent}{', '.join(narrow)} = {', '.join(f'float32({name})' for name in narrow)}"] if narrow else []
 
 
 def _states(program: Program) -> str:
-    names = ", ".join(q.name for q in program.states)
-    return names if len(program.states) > 1 else f"({names},)"
+    names = [q.name for q in program.states] + [f"{line.name}_line" for line in program.lines]
+    return ", ".join(names) if len(names) > 1 else f"({names[0]},)"
+
+
+def _delayed(program: Program, indent: str) -> list[str]:
+    return [f"{f'{indent}{line.name} = {line.name}_line.popleft()':<64}  # {line.text}" for line in program.lines]
+
+
+def _waiting(program: Program, indent: str) -> list[str]:
+    return [f"{indent}{line.name}_line.append({line.source})" for line in program.lines]
 
 
 def _scan(program: Program) -> list[str]:
@@ -112,7 +102,9 @@ def _scan(program: Program) -> list[str]:
         '    """Do one scan; change `state` and return the output."""',
         f"    {states} = state",
         *_rounded_inputs(program, "    "),
+        *_delayed(program, "    "),
         *_body(program, "    "),
+        *_waiting(program, "    "),
         f"    state[:] = {states}",
         f"    return {program.output}",
     ]
@@ -126,18 +118,35 @@ def _run(program: Program, name: str, *, fast: bool = False) -> list[str]:
     used = {n for assign in program.body for n in names_in(assign.value)}
     local = "".join(f", {q.name}={q.name}" for q in program.coefficients if q.name in used)
     loop = f"for {arguments} in zip({signals}, strict=True):" if len(program.inputs) > 1 else f"for {arguments} in {signals}:"
+    several = len(program.recorded) > 1
+    lists = [f"outputs_{n}" if several else "outputs" for n in program.recorded]
     return [
         f"def {name}(state, {signals}{local if fast else ''}):",
         '    """Do one scan per sample of the signals; change `state` and return the outputs."""',
         f"    {states} = state",
-        "    outputs = []",
+        *(f"    {held} = []" for held in lists),
         f"    {loop}",
         *_rounded_inputs(program, "        "),
+        *_delayed(program, "        "),
         *_body(program, "        "),
-        f"        outputs.append({program.output})",
+        *_waiting(program, "        "),
+        *(f"        {held}.append({recorded})" for held, recorded in zip(lists, program.recorded, strict=True)),
         f"    state[:] = {states}",
-        "    return outputs",
+        f"    return {', '.join(lists)}",
     ]
+
+
+def _imports(program: Program) -> list[str]:
+    lines = ["from collections import deque"] if program.lines else []
+    if program.precision == "float32":
+        wide = program.wide_literals or program.wide
+        lines.append("from numpy import float32, float64" if wide else "from numpy import float32")
+    return [*lines, ""] if lines else []
+
+
+def _initial(program: Program) -> list[str]:
+    numbers = [_number(program, q.name, v) for q, v in zip(program.states, program.initial, strict=True)]
+    return [*numbers, *(f"deque([0.0] * {length})" for length in program.lengths)]
 
 
 def source(program: Program) -> str:
@@ -149,15 +158,14 @@ def source(program: Program) -> str:
         What to print.
     """
     lines = [f"# {' '.join(program.title.split())}", ""]
-    if program.precision == "float32":
-        lines += ["from numpy import float32, float64" if program.wide_literals else "from numpy import float32", ""]
+    lines += _imports(program)
     for quantity, value in zip(program.coefficients, program.values, strict=True):
-        lines.append(f"{f'{quantity.name} = {_number(program, value)}':<32}  # {quantity.text} [{quantity.unit}]")
+        lines.append(f"{f'{quantity.name} = {_number(program, quantity.name, value)}':<32}  # {quantity.text} [{quantity.unit}]")
     lines += ["", "# kept from scan to scan"]
     for quantity in program.states:
         lines.append(f"#   {quantity.name:<12} {quantity.text} [{quantity.unit}]")
     lines += [
-        f"INITIAL = [{', '.join(_number(program, v) for v in program.initial)}]",
+        f"INITIAL = [{', '.join(_initial(program))}]",
         "",
         "",
         *_scan(program),
@@ -177,33 +185,56 @@ class Compiled:
     scan : callable
         ``scan(state, *inputs) -> u``, with one number per input of the program.
     run : callable
-        ``run(state, *signals) -> list of u``, with one sequence per input.
+        ``run(state, *signals) -> list of u``, with one sequence per input; one list per name where more than one is recorded.
     run_automatic : callable
-        ``run_automatic(state, sp, pv, ...) -> list of u``: the same for scans after the first automatic one, without mode,
-        operator's output and output to follow.
+        ``run_automatic(state, sp, pv, ...)``: the same for scans after the first automatic one, without mode, operator's output and
+        output to follow.
     initial : tuple of float
         The states before the first scan, in the program's precision.
-    read_in_automatic : frozenset of str
-        Inputs that `run_automatic` reads.
-    bind : callable
-        From the coefficients' values to the three functions.
+    read_in_automatic : tuple of str
+        Inputs that `run_automatic` reads, in its order.
     """
 
     scan: Callable[..., float]
-    run: Callable[..., list[float]]
-    run_automatic: Callable[..., list[float]]
+    run: Callable[..., Any]
+    run_automatic: Callable[..., Any]
     initial: tuple[float, ...]
-    read_in_automatic: frozenset[str]
-    bind: Callable[..., Any]
+    read_in_automatic: tuple[str, ...]
 
 
-@lru_cache(maxsize=256)
-def _code(text: str) -> CodeType:
-    return compile(text, "<scan program>", "exec")
+def compiled(program: Program) -> Compiled:
+    """Return the program as Python functions.
+
+    The functions' text does not hold the coefficients, so loops that share a structure share the compiled code.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    """
+    bind, read = _bound(program.structure)
+    coefficients = (q.name for q in program.coefficients)
+    values = [in_precision(program, name, x) for name, x in zip(coefficients, program.values, strict=True)]
+    scan, run, run_automatic = bind(*values)
+    return Compiled(scan, run, run_automatic, starting(program), read)
 
 
-def _text(program: Program) -> str:
-    lines = [*_scan(program), *_run(program, "run", fast=True), *_run(specialise(program), "run_automatic", fast=True)]
+@lru_cache(maxsize=512)
+def _bound(structure: Structure) -> tuple[Callable[..., Any], tuple[str, ...]]:
+    """Return what makes functions of the coefficients' values, and what the one for automatic scans reads."""
+    program = structure.bare()
+    automatic = specialise(program)
+    names: dict[str, Any] = {}
+    if program.precision == "float32":
+        import numpy as np
+
+        names = {"float32": np.float32, "float64": np.float64}
+    exec(_text(program, automatic), names)  # our own text: nothing of the user's goes into it
+    return names["bind"], tuple(q.name for q in automatic.inputs)
+
+
+def _text(program: Program, automatic: Program) -> str:
+    lines = [*_scan(program), *_run(program, "run", fast=True), *_run(automatic, "run_automatic", fast=True)]
     return "\n".join(
         [
             f"def bind({', '.join(q.name for q in program.coefficients)}):",
@@ -213,38 +244,16 @@ def _text(program: Program) -> str:
     )
 
 
-def compiled(program: Program, like: tuple[Program, Compiled] | None = None) -> Compiled:
-    """Return the program as Python functions.
-
-    The functions' text does not hold the coefficients, so loops that share a structure share the compiled code.
-
-    Parameters
-    ----------
-    program : Program
-        The program.
-    like : tuple of Program and Compiled, optional
-        A program of which this one is known to differ in its coefficients' values only, and its functions.
-    """
-    if like is not None and [q.name for q in like[0].coefficients] == [q.name for q in program.coefficients]:
-        bind = like[1].bind
-    else:
-        names: dict[str, Any] = {}
-        if program.precision == "float32":
-            import numpy as np
-
-            names = {"float32": np.float32, "float64": np.float64}
-        exec(_code(_text(program)), names)  # our own text: nothing of the user's goes into it
-        bind = names["bind"]
-    values, initial = program.values, program.initial
-    if program.precision == "float32":
-        values, initial = _narrow(values), _narrow(initial)
-    scan, run, run_automatic = bind(*values)
-    read = like[1].read_in_automatic if like is not None else frozenset(q.name for q in specialise(program).inputs)
-    return Compiled(scan, run, run_automatic, initial, read, bind)
+def starting(program: Program) -> tuple[float, ...]:
+    """Return the states before the first scan, in their precision; a program's delay lines are further states, empty."""
+    return tuple(in_precision(program, q.name, x) for q, x in zip(program.states, program.initial, strict=True))
 
 
-def _narrow(values: Sequence[float]) -> tuple[float, ...]:
+def in_precision(program: Program, name: str, value: float) -> float:
+    """Return a value in the precision of a name of the program."""
+    if program.precision == "float64":
+        return value
     import numpy as np
 
     with np.errstate(over="ignore"):
-        return tuple(np.float32(v) for v in values)  # type: ignore[misc]  # they stand in for floats
+        return np.float64(value) if program.is_wide(name) else np.float32(value)  # type: ignore[return-value]  # stands in
