@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+import numpy as np
+
 from pidemu.scan.precision import explicit
 from pidemu.scan.program import Binary, Cast, Expr, Floor, Name, Number, Program, Select, Structure, names_in
 from pidemu.scan.specialise import specialise
+from pidemu.targets.runner import Floats, Run, Runner
 
 _PRECEDENCE: Final = {
     "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
@@ -226,8 +229,6 @@ def _bound(structure: Structure) -> tuple[Callable[..., Any], tuple[str, ...]]:
     automatic = specialise(program)
     names: dict[str, Any] = {}
     if program.precision == "float32":
-        import numpy as np
-
         names = {"float32": np.float32, "float64": np.float64}
     exec(_text(program, automatic), names)  # our own text: nothing of the user's goes into it
     return names["bind"], tuple(q.name for q in automatic.inputs)
@@ -253,7 +254,25 @@ def in_precision(program: Program, name: str, value: float) -> float:
     """Return a value in the precision of a name of the program."""
     if program.precision == "float64":
         return value
-    import numpy as np
-
     with np.errstate(over="ignore"):
         return np.float64(value) if program.is_wide(name) else np.float32(value)  # type: ignore[return-value]  # stands in
+
+
+def runner(program: Program) -> Runner:
+    """Return the program as functions over records, in plain Python.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    """
+    functions = compiled(program)
+
+    def over(run: Callable[..., Any]) -> Run:
+        def record(state: list[Any], signals: Sequence[Floats]) -> Floats:
+            found = run(state, *(s.tolist() for s in signals))
+            return np.array(found if program.also else [found], dtype=np.float64)
+
+        return record
+
+    return Runner(over(functions.run), over(functions.run_automatic), functions.read_in_automatic)
