@@ -9,6 +9,8 @@
     ├── SettingError         a setting or option of a card is unknown, missing or out of range
     │   └── UndefinedError   a combination of options that makes no controller
     ├── ScanError            an algorithm cannot be run at this scan interval or with these limits
+    ├── EngineError          a back end is not there, or cannot run what it is asked to
+    ├── FleetError           a fleet of loops cannot be read or run as asked
     ├── RecordError          a recorded signal file cannot be used
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
@@ -107,6 +109,14 @@ class UndefinedError(SettingError):
 
 class ScanError(PidemuError):
     """An algorithm cannot be run as asked: scan interval, limits, engine or signals."""
+
+
+class EngineError(PidemuError):
+    """A back end is not there, or cannot run what it is asked to."""
+
+
+class FleetError(PidemuError):
+    """A fleet of loops cannot be read or run as asked."""
 
 
 class RecordError(PidemuError):

@@ -23,7 +23,8 @@ from pidemu.law import Law
 from pidemu.scan.build import build
 from pidemu.scan.program import Binary, Expr, Name, Number, Operator, Program, Select
 from pidemu.settings import limits
-from pidemu.targets.python import compiled, render, source
+from pidemu.targets.expressions import render
+from pidemu.targets.python import compiled, source
 from tests.helpers import WIDE, Floats, outputs, scans_of, settings_of
 
 PATHS: tuple[Literal["feedback"], Literal["setpoint"]] = ("feedback", "setpoint")

@@ -2,74 +2,28 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from pidemu.scan.precision import explicit
-from pidemu.scan.program import Binary, Cast, Expr, Floor, Name, Number, Program, Select, Structure, names_in
+from pidemu.scan.program import Program, Structure, names_in
 from pidemu.scan.specialise import specialise
+from pidemu.targets.expressions import literal, render
 from pidemu.targets.runner import Floats, Run, Runner
-
-_PRECEDENCE: Final = {
-    "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
-}  # fmt: skip
-_SELECT: Final = 0
-_ATOM: Final = 9
-
-
-def render(x: Expr) -> str:
-    """Return an expression as Python."""
-    return _render(x)[0]
-
-
-def _literal(value: float) -> str:
-    return repr(value) if math.isfinite(value) else f'float("{value!r}")'
 
 
 def _number(program: Program, name: str, value: float) -> str:
     """Return a coefficient or an initial value, in its name's precision."""
-    return _literal(value) if program.precision == "float64" else f"{_precision(program, name)}({_literal(value)})"
+    return literal(value) if program.precision == "float64" else f"{_precision(program, name)}({literal(value)})"
 
 
 def _precision(program: Program, name: str) -> str:
     return "float64" if program.is_wide(name) else "float32"
-
-
-def _render(x: Expr) -> tuple[str, int]:
-    match x:
-        case Number(value=value):
-            return _literal(value), _ATOM if value >= 0 else 7
-        case Name(id=name):
-            return name, _ATOM
-        case Select(condition=condition, yes=yes, no=no):
-            test, then = (_wrapped(part, 1) for part in (condition, yes))
-            return f"{then} if {test} else {_wrapped(no, _SELECT)}", _SELECT
-        case Cast(operand=operand, precision=precision):
-            return f"{precision}({_render(operand)[0]})", _ATOM
-        case Binary(operator=operator, left=left, right=right):
-            level = _PRECEDENCE[operator]
-            compares = level == _PRECEDENCE["<"]  # Python chains comparisons: a < b < c is not (a < b) < c
-            before, after = level + compares, level + (level > _PRECEDENCE["and"])
-            return f"{_wrapped(_weak(left), before)} {operator} {_wrapped(_weak(right), after)}", level
-        case Floor(operand=operand):
-            return f"{_wrapped(operand, _PRECEDENCE['*'])} // 1.0", _PRECEDENCE["/"]
-    raise TypeError(f"no Python for {type(x).__name__}")
-
-
-def _weak(x: Expr) -> Expr:
-    """Return an operand; a plain number gives way to a float32 one by itself."""
-    return x.operand if isinstance(x, Cast) and isinstance(x.operand, Number) and x.precision == "float32" else x
-
-
-def _wrapped(x: Expr, least: int) -> str:
-    text, level = _render(x)
-    return text if level >= least else f"({text})"
 
 
 def _body(program: Program, indent: str) -> list[str]:

@@ -1,0 +1,139 @@
+"""A scan program as Numba functions: source kept in a cache folder, compiled once per structure (extra ``fast``)."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import chain
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.cache import written
+from pidemu.scan.program import Program, Structure
+from pidemu.scan.specialise import specialise
+from pidemu.targets.numba_text import WIDTH, block_text, module_text, record_text
+from pidemu.targets.runner import Block, Floats, Run, Runner
+
+__all__ = ["WIDTH", "block", "is_compiled", "runner"]
+
+
+def runner(program: Program) -> Runner:
+    """Return the program as compiled functions over records.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+
+    Raises
+    ------
+    ImportError
+        Numba is not installed.
+    """
+    module, read = _record_module(program.structure)
+    values = np.array(program.values, dtype=np.float64)
+    return Runner(_over(program, values, module.run), _over(program, values, module.run_automatic), read)
+
+
+def block(structure: Structure) -> Block:
+    """Return what runs blocks of `WIDTH` loops of a structure.
+
+    Parameters
+    ----------
+    structure : Structure
+        What the loops have in common.
+
+    Raises
+    ------
+    ImportError
+        Numba is not installed.
+    """
+    function = _block_module(structure).block
+
+    def run(
+        values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: npt.NDArray[np.int64], at: int, records: Floats
+    ) -> None:
+        left = np.empty(lengths.size)
+        flat = (np.ravel(x) for x in (values, states, signals, rings, lengths))
+        function(*flat, left, at, records.shape[1], rings.shape[1], np.ravel(records))
+
+    return run
+
+
+def is_compiled(structure: Structure, *, blocks: bool = False) -> bool:
+    """Tell whether a structure has been compiled, in this process or an earlier one.
+
+    Parameters
+    ----------
+    structure : Structure
+        The structure.
+    blocks : bool
+        For blocks of loops, or for one loop over a record.
+    """
+    path = _path(_block_source(structure) if blocks else _record_source(structure)[0])
+    function = "block" if blocks else "run_automatic"
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    return any(path.parent.glob(f"__pycache__/{path.stem}.{function}-*.{version}*.nbi"))
+
+
+@lru_cache(maxsize=512)
+def _record_source(structure: Structure) -> tuple[str, tuple[str, ...]]:
+    program = structure.bare()
+    automatic = specialise(program)
+    text = module_text(record_text(program, "run"), record_text(automatic, "run_automatic"))
+    return text, tuple(q.name for q in automatic.inputs)
+
+
+@lru_cache(maxsize=512)
+def _block_source(structure: Structure) -> str:
+    return module_text(block_text(structure.bare()))
+
+
+@lru_cache(maxsize=512)
+def _record_module(structure: Structure) -> tuple[ModuleType, tuple[str, ...]]:
+    text, read = _record_source(structure)
+    return _module(text), read
+
+
+@lru_cache(maxsize=512)
+def _block_module(structure: Structure) -> ModuleType:
+    return _module(_block_source(structure))
+
+
+def _path(text: str) -> Path:
+    return written(f"scan_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py", text)
+
+
+def _module(text: str) -> ModuleType:
+    """Return a module made from a file of the cache folder, beside which Numba keeps what it compiled."""
+    path = _path(text)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module  # Numba looks it up by name when it loads what it kept
+    spec.loader.exec_module(module)
+    return module
+
+
+def _over(program: Program, values: Floats, function: Callable[..., None]) -> Run:
+    def run(state: list[Any], signals: Sequence[Floats]) -> Floats:
+        count = len(program.states)
+        states = np.array(state[:count], dtype=np.float64)
+        lines = [np.array(line, dtype=np.float64) for line in state[count:]]
+        records = np.empty((len(program.recorded), signals[0].size))
+        function(values, states, *(np.ascontiguousarray(s, dtype=np.float64) for s in signals), *lines, *records)
+        state[:count] = [kind(x) for kind, x in zip(map(type, state), states.tolist(), strict=False)]
+        for held, line in zip(state[count:], lines, strict=True):
+            oldest = records.shape[1] % line.size
+            held.extend(chain(line[oldest:].tolist(), line[:oldest].tolist()))
+        return records
+
+    return run

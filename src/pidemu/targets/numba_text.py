@@ -1,0 +1,107 @@
+"""A scan program as source for Numba: one loop over a record, and a block of loops side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from pidemu.scan.precision import explicit
+from pidemu.scan.program import Program, names_in
+from pidemu.targets.expressions import render
+
+WIDTH: Final = 64
+"""Loops in a block: a constant of the text, so that the compiler knows that rows do not overlap and computes several loops at once."""
+
+_HEAD: Final = """from math import inf, nan
+
+from numba import njit
+from numpy import float32, float64
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+"""
+_STEP: Final = " " * 8
+_LOOP: Final = " " * 12
+
+
+def module_text(*functions: str) -> str:
+    """Return a module of functions."""
+    return "\n\n".join([_HEAD, *functions]) + "\n"
+
+
+def record_text(program: Program, name: str) -> str:
+    """Return a function for one loop over a record: ``name(values, states, *signals, *lines, *outputs)``, all one-dimensional.
+
+    A delay line is a ring of as many values as it delays by scans; the oldest is at ``scans % length`` in the end.
+    """
+    inputs, states, lines = _names(program)
+    arguments = [f"{n}_n" for n in inputs] + [f"{n}_line" for n in lines] + [f"{n}_out" for n in program.recorded]
+    text = [
+        f"@jit\ndef {name}(values, states, {', '.join(arguments)}):",
+        *_coefficients(program, "values[{}]", "    "),
+        *(_load(program, n, f"states[{k}]", "    ") for k, n in enumerate(states)),
+        *(f"    {n}_at = 0" for n in lines),
+        f"    for n in range({program.output}_out.size):",
+        *(_load(program, n, f"{n}_n[n]", _STEP) for n in inputs),
+        *(_load(program, n, f"{n}_line[{n}_at]", _STEP) for n in lines),
+        *_body(program, _STEP),
+    ]
+    for line in program.lines:
+        at = f"{line.name}_at"
+        text += [
+            f"{_STEP}{line.name}_line[{at}] = {line.source}",
+            f"{_STEP}{at} = {at} + 1 if {at} + 1 < {line.name}_line.size else 0",
+        ]
+    text += [f"{_STEP}{n}_out[n] = {n}" for n in program.recorded]
+    return "\n".join([*text, *(f"    states[{k}] = {n}" for k, n in enumerate(states)), "    return"])
+
+
+def block_text(program: Program) -> str:
+    """Return a function for a block of loops: that of `pidemu.targets.runner.Block`, all arrays flat, and the numbers of scans and rows.
+
+    What leaves the delay lines is looked up for all loops first, so that the compiler can do the rest for several loops at once.
+    """
+    inputs, states, lines = _names(program)
+    where = f"[{{}} * {WIDTH} + i]"
+    text = [
+        "@jit\ndef block(values, states, signals, rings, lengths, left, at, scans, rows, records):",
+        "    for n in range(scans):",
+        *(f"{_STEP}row = (at + n) % rows" for _ in lines[:1]),
+    ]
+    for j in range(len(lines)):
+        text += [
+            f"{_STEP}for i in range({WIDTH}):",
+            f"{_LOOP}r = row - lengths[{j * WIDTH} + i]",
+            f"{_LOOP}r = r + rows if r < 0 else r",
+            f"{_LOOP}left[{j * WIDTH} + i] = rings[({j} * rows + r) * {WIDTH} + i]",
+        ]
+    text += [
+        f"{_STEP}for i in range({WIDTH}):",
+        *_coefficients(program, "values" + where, _LOOP),
+        *(_load(program, n, "states" + where.format(k), _LOOP) for k, n in enumerate(states)),
+        *(_load(program, n, "signals" + where.format(f"({k} * scans + n)"), _LOOP) for k, n in enumerate(inputs)),
+        *(_load(program, n, "left" + where.format(j), _LOOP) for j, n in enumerate(lines)),
+        *_body(program, _LOOP),
+        *(f"{_LOOP}states{where.format(k)} = {n}" for k, n in enumerate(states)),
+        *(f"{_LOOP}rings{where.format(f'({j} * rows + row)')} = {line.source}" for j, line in enumerate(program.lines)),
+        *(f"{_LOOP}records{where.format(f'({r} * scans + n)')} = {n}" for r, n in enumerate(program.recorded)),
+    ]
+    return "\n".join(text)
+
+
+def _names(program: Program) -> tuple[list[str], list[str], list[str]]:
+    return [q.name for q in program.inputs], [q.name for q in program.states], [line.name for line in program.lines]
+
+
+def _load(program: Program, name: str, place: str, indent: str) -> str:
+    return f"{indent}{name} = {place if program.is_wide(name) else f'float32({place})'}"
+
+
+def _coefficients(program: Program, place: str, indent: str) -> Iterable[str]:
+    read = {n for assign in program.body for n in names_in(assign.value)} | set(program.recorded)
+    for k, q in enumerate(program.coefficients):
+        if q.name in read:
+            yield _load(program, q.name, place.format(k), indent)
+
+
+def _body(program: Program, indent: str) -> Iterable[str]:
+    return (f"{indent}{assign.name} = {render(assign.value, for_compiler=True)}" for assign in explicit(program))
