@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from simple_pid import PID
 
 import pidemu
-from pidemu.errors import ScanError
+from pidemu.errors import EngineError, ScanError
 from pidemu.settings import Settings
 from tests.helpers import Floats, option_combinations, scans_of, settings_of
 
@@ -134,7 +134,7 @@ def test_an_unknown_action_is_refused_with_the_cards_own_words() -> None:
 
 
 def test_an_engine_that_is_not_there_is_refused() -> None:
-    with pytest.raises(ScanError, match="engine 'steam' is not available"):
+    with pytest.raises(EngineError, match="there is no engine 'steam'; engines: python, numpy, numba, c"):
         pidemu.Controller(pi(), engine="steam")  # type: ignore[arg-type]
 
 

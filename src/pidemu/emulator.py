@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pidemu.canonical import default_scan
 from pidemu.card.stages import Faults
 from pidemu.doubtful import bad_signal, usable_interval
+from pidemu.engines import Choice, Engine, checked, for_record
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.running import Running, resting
 from pidemu.scan.build import Action, build
@@ -22,8 +23,7 @@ from pidemu.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, 
 
 if TYPE_CHECKING:
     from pidemu.targets.python import Compiled
-
-Engine = Literal["python"]
+    from pidemu.targets.runner import Runner
 
 
 def _pair(limits: Sequence[float]) -> tuple[float, float]:
@@ -53,8 +53,9 @@ class Controller:
         Output at zero error of a positional controller without integral action [as limits].
     initial_output : float
         Output before the first scan [as limits]; the first automatic scan is a transfer from there.
-    engine : {"python"}, optional
-        Which back end runs the program.
+    engine : {"python", "numpy", "numba", "c"}, optional
+        Which back end `run` uses; all give the same bits. By default the quickest for the length of the record
+        (`pidemu.engines`). Single scans are always plain Python.
 
     Attributes
     ----------
@@ -66,11 +67,15 @@ class Controller:
         The scan program.
     events : list of Event
         Changes of mode with their bumps, changes of settings, and what was wrong with signals and intervals.
+    engine : Choice
+        Which back end the last `run` used, and why.
 
     Raises
     ------
     ScanError
-        Scan interval, limits, action or engine cannot be used.
+        Scan interval, limits or action cannot be used.
+    EngineError
+        The engine is not there.
 
     Examples
     --------
@@ -92,8 +97,8 @@ class Controller:
         initial_output: float = 0.0,
         engine: Engine | None = None,
     ) -> None:
-        if engine not in (None, "python"):
-            raise ScanError(f"engine '{engine}' is not available; use 'python'")
+        self._forced = checked(engine)
+        self.engine = Choice(self._forced or "python", "asked for" if self._forced else "nothing has been run")
         if action not in ("reverse", "direct"):
             names = settings.equation.action.names
             words = ", ".join(f"'{k}' ({v})" for k, v in names.items())
@@ -539,6 +544,8 @@ class Controller:
     def _run(self, signals: Mapping[str, Floats], measured: bool) -> Floats:
         modes = modes_of(signals)
         out = np.empty(modes.size)
+        self.engine = for_record(self.program, modes.size, self._forced)
+        fast = self._running.runner(self.engine.engine)
         odd = (signals["hold"] > 0) | ~np.isfinite(signals["sp"]) | ~np.isfinite(signals["pv"])
         odd |= np.isinf(signals.get("cascade", signals["sp"]))
         if measured:
@@ -552,24 +559,20 @@ class Controller:
                     h = float(signals["interval"][i]) if measured else None
                     out[i] = self._odd_scan(mode, sample, bool(signals["hold"][i] > 0), h)
             else:
-                self._spell(mode, out[start:end], [s[start:end] for s in inputs])
+                self._spell(fast, mode, out[start:end], [s[start:end] for s in inputs])
         return out
 
-    def _spell(self, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
+    def _spell(self, fast: Runner, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
         was = self.output
-        general = 1 if mode in ("automatic", "cascade") else out.size
-        compiled = self._running.compiled
         with self._running.quiet():
-            out[:general] = compiled.run(self._state, *(s[:general].tolist() for s in inputs))
-            if general < out.size:
-                tail = [
-                    s[general:].tolist()
-                    for q, s in zip(self.program.inputs, inputs, strict=True)
-                    if q.name in compiled.read_in_automatic
-                ]
-                rest = compiled.run_automatic(self._state, *tail)
-                out[general:] = np.fromiter(rest, float, len(rest))
+            if mode in ("automatic", "cascade"):
+                out[0] = self._scan(self._state, *(float(s[0]) for s in inputs))
+                if out.size > 1:
+                    named = {q.name: s[1:] for q, s in zip(self.program.inputs, inputs, strict=True)}
+                    out[1:] = fast.run_automatic(self._state, [named[name] for name in fast.read_in_automatic], out.size - 1)[0]
+            else:
+                out[:] = fast.run(self._state, inputs, out.size)[0]
         if mode != self._mode:
             self._transfer(self._count, mode, float(out[0]) - was)
         self._last = tuple(float(s[-1]) for s in inputs)

@@ -11,9 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from pidemu.algorithm import Algorithm
+from pidemu.engines import Engine, runner
 from pidemu.errors import ScanError
 from pidemu.scan.program import Program
 from pidemu.targets.python import Compiled, compiled
+from pidemu.targets.runner import Runner
 
 _REMEMBERED: Final = 64
 """Programs kept for other scan intervals."""
@@ -47,6 +49,7 @@ class Running:
         self._make = make
         self._places = {q.name: i for i, q in enumerate(self.program.states)}
         self._others: dict[float, Compiled] = {}
+        self._runners: dict[Engine, Runner] = {}
 
     def at(self, h: float) -> Compiled:
         """Return the functions for another scan interval [s].
@@ -69,6 +72,12 @@ class Running:
                 )
             found = self._others[h] = compiled(program)
         return found
+
+    def runner(self, engine: Engine) -> Runner:
+        """Return the functions that run the program over a record."""
+        if engine not in self._runners:
+            self._runners[engine] = runner(self.program, engine)
+        return self._runners[engine]
 
     def reset(self) -> None:
         """Go back to before the first scan."""

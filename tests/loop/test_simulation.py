@@ -13,6 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.engines import Choice
 from pidemu.errors import ProcessError, UndefinedError
 from pidemu.loop.figures import loop_figures, scan_for
 from pidemu.loop.load_response import continuous_load_iae, load_iae
@@ -22,6 +23,7 @@ from pidemu.settings import Settings
 
 Floats = npt.NDArray[np.float64]
 WIDE = (-1e9, 1e9)
+ANY = Choice("python", "any")
 FOPDT = Process.from_lags(1, [10], delay=2)
 
 
@@ -190,7 +192,7 @@ def test_by_default_the_scan_is_the_cards_and_short_enough_and_both_responses_se
 def test_the_iae_of_straight_lines_through_zero_is_exact() -> None:
     zero: Floats = np.zeros(3)
     times: Floats = np.array([0.0, 2.0, 4.0])
-    found = Simulation(parallel(kp=1), FOPDT, 2.0, "reverse", WIDE, times, zero, np.array([1.0, -3.0, -3.0]), zero, None, None)
+    found = Simulation(parallel(kp=1), FOPDT, 2.0, "reverse", WIDE, times, zero, np.array([1.0, -3.0, -3.0]), zero, None, None, ANY)
     assert found.iae == pytest.approx(0.5 * 0.5 * 1 + 0.5 * 1.5 * 3 + 2 * 3)
 
 

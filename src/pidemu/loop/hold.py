@@ -16,7 +16,6 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import mul
 from typing import Final
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.polynomial import polynomial
 from pidemu.errors import ProcessError
 from pidemu.loop.roots import polynomial_of
 from pidemu.rational import Response
+from pidemu.scan.blocks import TINY
 
 Floats = npt.NDArray[np.float64]
 _TERMS: Final = 18
@@ -100,14 +100,22 @@ class Plant:
 
     def measure(self) -> float:
         """Return the measurement [%]."""
-        return float(sum(map(mul, self._row, (*self._states, self._input))))
+        return _weighted(self._row, (*self._states, self._input))
 
     def move(self, u: float) -> None:
         """Go on by a scan with an input [%]."""
         self._on_the_way.append(u)
         before, self._input = self._input, self._on_the_way.popleft()
         now = (*self._states, before, self._input)  # plain numbers: quicker than arrays of two or three
-        self._states = [x + sum(map(mul, row, now)) for x, row in zip(self._states, self._step, strict=True)]
+        moved = (x + _weighted(row, now) for x, row in zip(self._states, self._step, strict=True))
+        self._states = [0.0 if -TINY < x < TINY else x for x in moved]  # no denormal numbers (section 7)
+
+
+def _weighted(weights: Sequence[float], values: Sequence[float]) -> float:
+    total = 0.0
+    for weight, x in zip(weights, values, strict=True):  # in the order of the scan program; `sum` compensates in later Pythons
+        total += weight * x
+    return total
 
 
 def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], delay: float, h: float) -> SampledProcess:

@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections import deque
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pidemu.certificate.models import LoopComparison, LoopFigures
 from pidemu.emulator import Controller
-from pidemu.errors import ProcessError
-from pidemu.loop.figures import loop_figures, scan_for, settling_time
+from pidemu.engines import Choice, Engine, checked, for_record, runner
+from pidemu.loop.figures import loop_figures
 from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
-from pidemu.loop.open_loop import low_frequency_sign
 from pidemu.loop.process import Process
-from pidemu.record.files import Record
-from pidemu.record.playback import Timing
-from pidemu.record.sampling import Scale, controller_for, limits_for
+from pidemu.loop.trial import Step, Trial, trial
+from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
+from pidemu.targets.python import starting
 
 Floats = npt.NDArray[np.float64]
-Step = tuple[float, float]
-
-_DEFAULT_SCANS: Final = 50_000
-"""The default duration ends here."""
-_MOST_SCANS: Final = 5_000_000
-_FULL: Final = (0.0, 100.0)
-_UNLIMITED: Final = (-1e12, 1e12)
 
 
 @dataclass(frozen=True)
@@ -54,6 +44,8 @@ class Simulation:
         Times of the scans [s], and the signals there [%]: the measurement as read, the output as it goes out.
     setpoint_step, load_step : tuple of float or None
         When and how far setpoint and load stepped [s, %].
+    engine : Choice
+        Which back end ran it, and why.
     """
 
     settings: Settings
@@ -67,6 +59,7 @@ class Simulation:
     output: Floats
     setpoint_step: Step | None
     load_step: Step | None
+    engine: Choice
 
     @property
     def error(self) -> Floats:
@@ -76,7 +69,7 @@ class Simulation:
     @property
     def iae(self) -> float:
         """Integral of the absolute error [% s], along straight lines between scans: from the load step or from the start."""
-        start = 0 if self.load_step is None else _first(self.times, self.load_step[0])
+        start = 0 if self.load_step is None else int(np.searchsorted(self.times, self.load_step[0] * (1 - 1e-12)))
         a, b = self.error[start:-1], self.error[start + 1 :]
         crosses = a * b < 0
         apart = np.where(crosses, np.abs(a - b), 1.0)
@@ -94,6 +87,7 @@ def simulate(
     action: Action | None = None,
     output_limits: tuple[float, float] | None = None,
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
+    engine: Engine | None = None,
 ) -> Simulation:
     """Run the emulated controller of a card in a closed loop with a process, from rest.
 
@@ -121,6 +115,8 @@ def simulate(
         Low and high output limit [%]; by default the card's, 0 to 100 where it has none.
     initial : tuple of float
         Setpoint, measurement and output [%] before; the process is at rest there.
+    engine : {"python", "numpy", "numba", "c"}, optional
+        Which back end runs the loop; all give the same bits. By default the quickest for the number of scans.
 
     Returns
     -------
@@ -133,6 +129,8 @@ def simulate(
         The time or a step cannot be used, or the card has no choice of action and its gain has the wrong sign for the process.
     ScanError
         The controller cannot be run as asked.
+    EngineError
+        The engine is not there.
 
     Examples
     --------
@@ -143,23 +141,45 @@ def simulate(
     >>> round(found.iae, 2)  # near 5 Ti/K = 25: the error hardly changes its sign
     25.0
     """
-    h = float(scan) if scan is not None else scan_for(settings, process)
-    length = _duration(settings, process, h) if time is None else float(time)
-    if not 0 < length < math.inf or not length < _MOST_SCANS * h:
-        raise ProcessError(f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses")
-    sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
-    chosen = action or _negative_feedback(settings, process)
-    limits = limits_for(settings, output_limits, _FULL)
-    if not limits[0] <= initial[2] <= limits[1]:
-        raise ProcessError(
-            f"the initial output {initial[2]:g} % is outside the output limits {limits[0]:g} to {limits[1]:g} %; give another, or "
-            f"other limits such as output_limits=(0, 100)"
-        )
-    times: Floats = np.arange(math.floor(length / h * (1 + 1e-12)) + 1, dtype=np.float64) * h
-    sp = initial[0] + _signal(sp_step, times)
-    controller = _at_rest(settings, h, chosen, limits, initial)
-    pv, out = _run(controller, Plant(process.sampled(h)), sp, _signal(load_step, times), initial)
-    return Simulation(settings, process, h, chosen, limits, times, sp, pv, out, sp_step, load_step)
+    forced = checked(engine)
+    made = trial(
+        settings,
+        process,
+        scan,
+        setpoint=setpoint,
+        load=load,
+        time=time,
+        action=action,
+        output_limits=output_limits,
+        initial=initial,
+    )
+    pv, out, choice = run_trial(made, forced)
+    return Simulation(
+        settings, process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
+        made.load_step, choice,
+    )  # fmt: skip
+
+
+def run_trial(made: Trial, forced: Engine | None = None) -> tuple[Floats, Floats, Choice]:
+    """Run a trial; return measurement and output [%], each of shape (scans,), and the engine.
+
+    Parameters
+    ----------
+    made : Trial
+        What to run.
+    forced : {"python", "numpy", "numba", "c"}, optional
+        The engine; by default the quickest.
+    """
+    controller, sp, load = made.controller(), made.setpoint, made.load
+    program = made.program(controller)
+    choice = for_record(program, made.scans, forced)
+    state = [*starting(program), *(deque([0.0] * length) for length in program.lengths)]
+    with np.errstate(all="ignore"):
+        out, pv = runner(program, choice.engine).run(state, [sp, load], made.scans)
+    if not (np.isfinite(pv).all() and np.isfinite(out).all()):  # what a card does then is the emulator's to know
+        pv, out = _scan_by_scan(controller, Plant(made.process.sampled(made.scan)), sp, load, made.initial)
+        return pv, out, Choice("python", "scan by scan, as the measurement outgrows all numbers")
+    return pv, out, choice
 
 
 def compare_loops(
@@ -194,74 +214,13 @@ def _figures(settings: Settings, process: Process, scan: float | None, factor: f
     return loop_figures(settings.law(scan), process, factor, iae)
 
 
-def _duration(settings: Settings, process: Process, h: float) -> float:
-    return min(2 * settling_time(settings, process, h), _DEFAULT_SCANS * h)
-
-
-def _negative_feedback(settings: Settings, process: Process) -> Action:
-    """Return the action with which the feedback is negative."""
-    right = process.feedback_sign * low_frequency_sign(settings.algorithm()) >= 0
-    if not right and settings.equation.action.fixed:
-        raise ProcessError(
-            f"{settings.card.id} has no choice of control action, and with the sign of its gain the feedback from {process} would "
-            f"be positive; give the gain the other sign"
-        )
-    return "reverse" if right else "direct"
-
-
-def _step(name: str, given: float | Step, at: float, end: float) -> Step | None:
-    """Return when and how far a signal steps, or ``None`` where it does not."""
-    try:
-        when, size = (float(x) for x in given) if isinstance(given, Sequence) else (at, float(given))
-    except (TypeError, ValueError):
-        raise ProcessError(f"{name} is {given!r}; give the size of the step in %, or (time, size)") from None
-    if not (math.isfinite(size) and 0 <= when < end):
-        raise ProcessError(f"a {name} step of {size:g} % at {when:g} s is not within the {end:g} s simulated; start it earlier")
-    return (when, size) if size else None
-
-
-def _signal(step: Step | None, times: Floats) -> Floats:
-    if step is None:
-        return np.zeros(times.size)
-    return np.where(np.arange(times.size) >= _first(times, step[0]), step[1], 0.0)
-
-
-def _first(times: Floats, at: float) -> int:
-    """Return the first scan at or after a time [s]."""
-    return int(np.searchsorted(times, at * (1 - 1e-12)))
-
-
-def _at_rest(
-    settings: Settings, h: float, action: Action, limits: tuple[float, float], initial: tuple[float, float, float]
-) -> Controller:
-    """Return a controller at rest; where nothing integrates, its bias is such that its output is the initial one there."""
-    sp, pv = _own(settings, np.array(initial[:2]))
-    output = Scale(settings).output_own(initial[2])
-    controller, biased = controller_for(settings, Timing(h), action, limits, initial[2])
-    if biased:
-        trial, _ = controller_for(settings, Timing(h), action, _UNLIMITED, initial[2])
-        trial.rest(sp, pv, output)
-        bias = 2 * output - trial.scan(sp, pv)
-        own = (Scale(settings).output_own(limits[0]), Scale(settings).output_own(limits[1]))
-        controller = Controller(settings, h, action, own, bias=bias, initial_output=output)
-    controller.rest(sp, pv, output)
-    return controller
-
-
-def _own(settings: Settings, percent: Floats) -> list[float]:
-    """Return setpoints or measurements in the controller's units."""
-    found: list[float] = Scale(settings).own(Record(sp=percent, pv=percent)).pv.tolist()
-    return found
-
-
-def _run(
+def _scan_by_scan(
     controller: Controller, plant: Plant, sp: Floats, load: Floats, initial: tuple[float, float, float]
 ) -> tuple[Floats, Floats]:
-    """Close the loop; return measurement and output [%]."""
-    settings = controller.settings
-    low, high = _own(settings, np.array(_FULL))
-    own_sp, rest_pv, rest_output = _own(settings, sp), initial[1], initial[2]
-    bottom, top = (Scale(settings).output_own(x) for x in _FULL)
+    """Close the loop of an emulated controller; return measurement and output [%]."""
+    scale = Scale(controller.settings)
+    (low, high), (bottom, top) = scale.spans
+    own_sp, rest_pv, rest_output = scale.signals_own(sp).tolist(), initial[1], initial[2]
     pv, out = np.empty(sp.size), np.empty(sp.size)
     with np.errstate(over="ignore", invalid="ignore"):
         for i, (r, d) in enumerate(zip(own_sp, load.tolist(), strict=True)):

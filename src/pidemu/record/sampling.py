@@ -38,6 +38,15 @@ class Scale:
         self._pv = (engineering and settings.pv_range) or (0.0, 100.0)
         self._op = (engineering and settings.op_range) or (0.0, 100.0)
 
+    @property
+    def spans(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """What 0 and 100 % of setpoint and measurement, and of the output, are in the controller's units."""
+        return self._pv, self._op
+
+    def signals_own(self, x: Floats) -> Floats:
+        """Return setpoints or measurements in percent in the controller's units."""
+        return _linear(x, self._pv, back=True)
+
     def percent(self, record: Record) -> Record:
         """Return a record in percent."""
         return self._scaled(record, back=False)

@@ -10,7 +10,7 @@ from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,10 @@ from pidemu.scan.specialise import specialise
 from pidemu.targets.numba_text import WIDTH, block_text, module_text, record_text
 from pidemu.targets.runner import Block, Floats, Run, Runner
 
-__all__ = ["WIDTH", "block", "is_compiled", "runner"]
+_FUNCTIONS: Final[dict[tuple[Structure, bool], Any]] = {}
+"""What is in use in this process: the function for blocks, or that for records in automatic."""
+
+__all__ = ["WIDTH", "block", "is_compiled", "is_loaded", "runner"]
 
 
 def runner(program: Program) -> Runner:
@@ -60,9 +63,12 @@ def block(structure: Structure) -> Block:
     def run(
         values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: npt.NDArray[np.int64], at: int, records: Floats
     ) -> None:
-        left = np.empty(lengths.size)
-        flat = (np.ravel(x) for x in (values, states, signals, rings, lengths))
-        function(*flat, left, at, records.shape[1], rings.shape[1], np.ravel(records))
+        assert states.flags.c_contiguous
+        assert rings.flags.c_contiguous
+        assert records.flags.c_contiguous  # what is written to must not be a copy
+        rows = [np.ravel(x) for parts in (signals, rings, lengths) for x in parts]
+        left = [np.empty(WIDTH) for _ in rings]
+        function(np.ravel(values), np.ravel(states), at, *rows, *left, *(np.ravel(x) for x in records))
 
     return run
 
@@ -83,6 +89,19 @@ def is_compiled(structure: Structure, *, blocks: bool = False) -> bool:
     return any(path.parent.glob(f"__pycache__/{path.stem}.{function}-*.{version}*.nbi"))
 
 
+def is_loaded(structure: Structure, *, blocks: bool = False) -> bool:
+    """Tell whether a structure is compiled and loaded in this process.
+
+    Parameters
+    ----------
+    structure : Structure
+        The structure.
+    blocks : bool
+        For blocks of loops, or for one loop over a record.
+    """
+    return (structure, blocks) in _FUNCTIONS and bool(_FUNCTIONS[structure, blocks].signatures)
+
+
 @lru_cache(maxsize=512)
 def _record_source(structure: Structure) -> tuple[str, tuple[str, ...]]:
     program = structure.bare()
@@ -99,12 +118,16 @@ def _block_source(structure: Structure) -> str:
 @lru_cache(maxsize=512)
 def _record_module(structure: Structure) -> tuple[ModuleType, tuple[str, ...]]:
     text, read = _record_source(structure)
-    return _module(text), read
+    module = _module(text)
+    _FUNCTIONS[structure, False] = module.run_automatic
+    return module, read
 
 
 @lru_cache(maxsize=512)
 def _block_module(structure: Structure) -> ModuleType:
-    return _module(_block_source(structure))
+    module = _module(_block_source(structure))
+    _FUNCTIONS[structure, True] = module.block
+    return module
 
 
 def _path(text: str) -> Path:
@@ -124,15 +147,15 @@ def _module(text: str) -> ModuleType:
 
 
 def _over(program: Program, values: Floats, function: Callable[..., None]) -> Run:
-    def run(state: list[Any], signals: Sequence[Floats]) -> Floats:
+    def run(state: list[Any], signals: Sequence[Floats], scans: int) -> Floats:
         count = len(program.states)
         states = np.array(state[:count], dtype=np.float64)
         lines = [np.array(line, dtype=np.float64) for line in state[count:]]
-        records = np.empty((len(program.recorded), signals[0].size))
+        records = np.empty((len(program.recorded), scans))
         function(values, states, *(np.ascontiguousarray(s, dtype=np.float64) for s in signals), *lines, *records)
         state[:count] = [kind(x) for kind, x in zip(map(type, state), states.tolist(), strict=False)]
         for held, line in zip(state[count:], lines, strict=True):
-            oldest = records.shape[1] % line.size
+            oldest = scans % line.size
             held.extend(chain(line[oldest:].tolist(), line[:oldest].tolist()))
         return records
 

@@ -10,7 +10,7 @@ from pidemu.scan.program import Program, names_in
 from pidemu.targets.expressions import render
 
 WIDTH: Final = 64
-"""Loops in a block: a constant of the text, so that the compiler knows that rows do not overlap and computes several loops at once."""
+"""Loops in a block: a constant of the text, so that the compiler knows that rows are apart and computes several loops at once."""
 
 _HEAD: Final = """from math import inf, nan
 
@@ -56,36 +56,44 @@ def record_text(program: Program, name: str) -> str:
 
 
 def block_text(program: Program) -> str:
-    """Return a function for a block of loops: that of `pidemu.targets.runner.Block`, all arrays flat, and the numbers of scans and rows.
+    """Return a function for a block of loops: ``block(values, states, at, *signals, *rings, *lengths, *left, *outputs)``.
 
-    What leaves the delay lines is looked up for all loops first, so that the compiler can do the rest for several loops at once.
+    All arrays are flat, their last dimension `WIDTH` loops long: `values` and `states` hold a row per name; a signal, a ring and an
+    output are arrays of their own, so that the compiler sees that they do not overlap. What leaves the delay lines is looked up for
+    all loops first, so that it can do the rest for several loops at once.
     """
     inputs, states, lines = _names(program)
-    where = f"[{{}} * {WIDTH} + i]"
+    arguments = [f"{n}_n" for n in inputs]
+    arguments += [f"{n}_{what}" for what in ("ring", "length", "left") for n in lines]
+    arguments += [f"{n}_out" for n in program.recorded]
+    row = "[{} * " + f"{WIDTH} + i]"
     text = [
-        "@jit\ndef block(values, states, signals, rings, lengths, left, at, scans, rows, records):",
+        f"@jit\ndef block(values, states, at, {', '.join(arguments)}):",
+        f"    scans = {program.output}_out.size // {WIDTH}",
+        *(f"    {n}_rows = {n}_ring.size // {WIDTH}" for n in lines),
         "    for n in range(scans):",
-        *(f"{_STEP}row = (at + n) % rows" for _ in lines[:1]),
-    ]
-    for j in range(len(lines)):
-        text += [
-            f"{_STEP}for i in range({WIDTH}):",
-            f"{_LOOP}r = row - lengths[{j * WIDTH} + i]",
-            f"{_LOOP}r = r + rows if r < 0 else r",
-            f"{_LOOP}left[{j * WIDTH} + i] = rings[({j} * rows + r) * {WIDTH} + i]",
-        ]
-    text += [
+        *(part for n in lines for part in _look_up(n)),
         f"{_STEP}for i in range({WIDTH}):",
-        *_coefficients(program, "values" + where, _LOOP),
-        *(_load(program, n, "states" + where.format(k), _LOOP) for k, n in enumerate(states)),
-        *(_load(program, n, "signals" + where.format(f"({k} * scans + n)"), _LOOP) for k, n in enumerate(inputs)),
-        *(_load(program, n, "left" + where.format(j), _LOOP) for j, n in enumerate(lines)),
+        *_coefficients(program, "values" + row, _LOOP),
+        *(_load(program, n, "states" + row.format(k), _LOOP) for k, n in enumerate(states)),
+        *(_load(program, n, f"{n}_n" + row.format("n"), _LOOP) for n in inputs),
+        *(_load(program, n, f"{n}_left[i]", _LOOP) for n in lines),
         *_body(program, _LOOP),
-        *(f"{_LOOP}states{where.format(k)} = {n}" for k, n in enumerate(states)),
-        *(f"{_LOOP}rings{where.format(f'({j} * rows + row)')} = {line.source}" for j, line in enumerate(program.lines)),
-        *(f"{_LOOP}records{where.format(f'({r} * scans + n)')} = {n}" for r, n in enumerate(program.recorded)),
+        *(f"{_LOOP}states{row.format(k)} = {n}" for k, n in enumerate(states)),
+        *(f"{_LOOP}{line.name}_ring{row.format(f'{line.name}_row')} = {line.source}" for line in program.lines),
+        *(f"{_LOOP}{n}_out{row.format('n')} = {n}" for n in program.recorded),
     ]
     return "\n".join(text)
+
+
+def _look_up(line: str) -> list[str]:
+    return [
+        f"{_STEP}{line}_row = (at + n) % {line}_rows",
+        f"{_STEP}for i in range({WIDTH}):",
+        f"{_LOOP}r = {line}_row - {line}_length[i]",
+        f"{_LOOP}r = r + {line}_rows if r < 0 else r",
+        f"{_LOOP}{line}_left[i] = {line}_ring[r * {WIDTH} + i]",
+    ]
 
 
 def _names(program: Program) -> tuple[list[str], list[str], list[str]]:

@@ -55,7 +55,7 @@ def _waiting(program: Program, indent: str) -> list[str]:
 def _scan(program: Program) -> list[str]:
     states = _states(program)
     return [
-        f"def scan(state, {', '.join(q.name for q in program.inputs)}):",
+        f"def scan({', '.join(['state', *(q.name for q in program.inputs)])}):",
         '    """Do one scan; change `state` and return the output."""',
         f"    {states} = state",
         *_rounded_inputs(program, "    "),
@@ -70,11 +70,12 @@ def _scan(program: Program) -> list[str]:
 def _run(program: Program, name: str, *, fast: bool = False) -> list[str]:
     """Return the function for many scans; `fast`: with the coefficients as local names, which are quicker to reach."""
     states = _states(program)
-    signals = ", ".join(f"{q.name}_n" for q in program.inputs)
+    signals = ", ".join(f"{q.name}_n" for q in program.inputs) or "scans"
     arguments = ", ".join(q.name for q in program.inputs)
     used = {n for assign in program.body for n in names_in(assign.value)}
     local = "".join(f", {q.name}={q.name}" for q in program.coefficients if q.name in used)
     loop = f"for {arguments} in zip({signals}, strict=True):" if len(program.inputs) > 1 else f"for {arguments} in {signals}:"
+    loop = loop if program.inputs else "for _ in range(scans):"
     several = len(program.recorded) > 1
     lists = [f"outputs_{n}" if several else "outputs" for n in program.recorded]
     return [
@@ -223,8 +224,8 @@ def runner(program: Program) -> Runner:
     functions = compiled(program)
 
     def over(run: Callable[..., Any]) -> Run:
-        def record(state: list[Any], signals: Sequence[Floats]) -> Floats:
-            found = run(state, *(s.tolist() for s in signals))
+        def record(state: list[Any], signals: Sequence[Floats], scans: int) -> Floats:
+            found = run(state, *(s.tolist() for s in signals)) if signals else run(state, scans)
             return np.array(found if program.also else [found], dtype=np.float64)
 
         return record

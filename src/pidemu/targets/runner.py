@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-Run = Callable[[list[Any], Sequence[Floats]], Floats]
+Run = Callable[[list[Any], Sequence[Floats], int], Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +20,9 @@ class Runner:
     Attributes
     ----------
     run : callable
-        ``run(state, signals)``: one scan per sample; `state` is a list as `pidemu.targets.python.starting` and the program's delay
-        lines (deques) make it, and is changed in place; `signals` holds an array of shape (n,) per input of the program. Returns an
-        array of shape (recorded names, n).
+        ``run(state, signals, scans)``: so many scans; `state` is a list as `pidemu.targets.python.starting` and the program's delay
+        lines (deques) make it, and is changed in place; `signals` holds an array of shape (scans,) per input of the program. Returns
+        an array of shape (recorded names, scans).
     run_automatic : callable
         The same for scans after the first automatic one, with the signals in `read_in_automatic`.
     read_in_automatic : tuple of str

@@ -1,0 +1,164 @@
+"""Engines: which back end runs a program.
+
+All give the same bits; they differ in what a scan costs and in what it costs to begin. Plain Python begins at once and costs some
+hundred nanoseconds a scan; what Numba compiles costs some nanoseconds, but has to be compiled, or loaded from the cache folder,
+first; NumPy does every operation for many loops at once. The figures behind the choice are measured ones, rounded; they decide
+about time and nothing else.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+from pidemu.errors import EngineError, suggest
+from pidemu.scan.program import Program, Structure
+from pidemu.targets import python
+from pidemu.targets.runner import Runner
+
+Engine = Literal["python", "numpy", "numba", "c"]
+ENGINES: Final[tuple[Engine, ...]] = get_args(Engine)
+
+_PYTHON: Final = 15e-9
+"""Seconds per assignment and scan in plain Python."""
+_IMPORT: Final = 0.4
+"""Seconds to import Numba."""
+_COMPILE: Final = 0.7
+"""Seconds in which it compiles a structure."""
+_LOAD: Final = 0.05
+"""Seconds to load one that was compiled."""
+_CALL: Final = 2e-4
+"""Seconds to look up one that is loaded, and to call it."""
+_LOOPS_FOR_NUMPY: Final = 12
+"""Loops side by side from which on NumPy is quicker than loop after loop in plain Python."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Which engine runs something, and why.
+
+    Attributes
+    ----------
+    engine : {"python", "numpy", "numba", "c"}
+        The engine.
+    reason : str
+        Why this one.
+    """
+
+    engine: Engine
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.engine} ({self.reason})"
+
+
+def checked(engine: str | None) -> Engine | None:
+    """Return the name of an engine that can run here; ``None`` leaves the choice.
+
+    Raises
+    ------
+    EngineError
+        There is no such engine, or what it needs is not installed.
+    """
+    if engine is None:
+        return None
+    known = next((e for e in ENGINES if e == engine), None)
+    if known is None:
+        raise EngineError(f"there is no engine '{engine}'{suggest(engine, ENGINES)}; engines: {', '.join(ENGINES)}")
+    if known == "numba" and not has_numba():
+        raise EngineError("the engine 'numba' needs Numba, which is not installed; pip install 'pidemu[fast]' brings it")
+    if known == "c":
+        from pidemu.targets import native
+
+        native.compiler()
+    return known
+
+
+def has_numba() -> bool:
+    """Tell whether Numba is installed."""
+    return "numba" in sys.modules or importlib.util.find_spec("numba") is not None
+
+
+def for_record(program: Program, scans: int, forced: Engine | None = None) -> Choice:
+    """Return the engine for one loop over a record.
+
+    Parameters
+    ----------
+    program : Program
+        What runs.
+    scans : int
+        Samples of the record.
+    forced : {"python", "numpy", "numba", "c"}, optional
+        The engine that was asked for.
+    """
+    if forced is not None:
+        return Choice(forced, "asked for")
+    in_python = _PYTHON * len(program.body) * scans
+    if in_python < _CALL:
+        return Choice("python", "too short to be worth a call into compiled code")
+    if not has_numba():
+        return Choice("python", "Numba is not installed")
+    return _weighed(program.structure, in_python, blocks=False)
+
+
+def for_loops(structure: Structure, scans: int, loops: int, forced: Engine | None = None) -> Choice:
+    """Return the engine for loops of one structure side by side.
+
+    Parameters
+    ----------
+    structure : Structure
+        What runs.
+    scans, loops : int
+        Scans of each loop, and how many loops.
+    forced : {"python", "numpy", "numba", "c"}, optional
+        The engine that was asked for.
+    """
+    if forced is not None:
+        return Choice(forced, "asked for")
+    alone: Choice = Choice("numpy", "many loops") if loops >= _LOOPS_FOR_NUMPY else Choice("python", "few loops")
+    if not has_numba():
+        return Choice(alone.engine, f"{alone.reason}, and Numba is not installed")
+    in_python = _PYTHON * len(structure.body) * scans * loops
+    found = _weighed(structure, in_python / (8 if alone.engine == "numpy" else 1), blocks=True)
+    return found if found.engine == "numba" else Choice(alone.engine, f"{alone.reason}, {found.reason}")
+
+
+def _weighed(structure: Structure, otherwise: float, *, blocks: bool) -> Choice:
+    """Weigh the seconds without Numba against those that it needs to begin."""
+    from pidemu.targets import numba
+
+    begun = 0.0 if "numba" in sys.modules else _IMPORT
+    if numba.is_loaded(structure, blocks=blocks):
+        return Choice("numba", "compiled already")
+    if otherwise > begun + _LOAD and numba.is_compiled(structure, blocks=blocks):
+        return Choice("numba", "compiled by an earlier run")
+    if otherwise > begun + _COMPILE:
+        return Choice("numba", "long enough to be worth compiling")
+    return Choice("python", "too short to be worth compiling")
+
+
+def runner(program: Program, engine: Engine) -> Runner:
+    """Return a program as functions over records, run by an engine.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    engine : {"python", "numpy", "numba", "c"}
+        The engine.
+    """
+    if engine == "python":
+        return python.runner(program)
+    if engine == "numba":
+        from pidemu.targets import numba
+
+        return numba.runner(program)
+    if engine == "numpy":
+        from pidemu.targets import numpy
+
+        return numpy.runner(program)
+    from pidemu.targets import native
+
+    return native.runner(program)
