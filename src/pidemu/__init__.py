@@ -28,6 +28,9 @@ if TYPE_CHECKING:
         SettingError,
         UnitError,
     )
+    from pidemu.fleet.fleet import Fleet
+    from pidemu.fleet.loops import Loop
+    from pidemu.fleet.result import FleetResult
     from pidemu.law import Law
     from pidemu.loop.process import Process
     from pidemu.loop.simulation import Simulation, simulate
@@ -59,6 +62,9 @@ _HOMES = {
     "SettingError": "errors",
     "UnitError": "errors",
     "Event": "signals",
+    "Fleet": "fleet.fleet",
+    "FleetResult": "fleet.result",
+    "Loop": "fleet.loops",
     "Law": "law",
     "Process": "loop.process",
     "Record": "record.files",
@@ -77,8 +83,11 @@ __all__ = [
     "ConversionRefusedError",
     "EngineError",
     "Event",
+    "Fleet",
     "FleetError",
+    "FleetResult",
     "Law",
+    "Loop",
     "PidemuError",
     "Process",
     "ProcessError",

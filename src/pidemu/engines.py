@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
 
 from pidemu.errors import EngineError, suggest
 from pidemu.scan.program import Program, Structure
 from pidemu.targets import python
-from pidemu.targets.runner import Runner
+from pidemu.targets.runner import Block, Floats, Runner
 
 Engine = Literal["python", "numpy", "numba", "c"]
 ENGINES: Final[tuple[Engine, ...]] = get_args(Engine)
@@ -162,3 +166,45 @@ def runner(program: Program, engine: Engine) -> Runner:
     from pidemu.targets import native
 
     return native.runner(program)
+
+
+def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
+    """Return what runs loops of a structure side by side, and how many loops a block has.
+
+    Parameters
+    ----------
+    structure : Structure
+        What the loops have in common.
+    engine : {"python", "numpy", "numba", "c"}
+        The engine. Plain Python and C run one loop after the other.
+    """
+    if engine == "numba":
+        from pidemu.targets import numba
+
+        return numba.block(structure), numba.WIDTH
+    if engine == "numpy":
+        from pidemu.targets import numpy
+
+        return numpy.block(structure), numpy.WIDTH
+    return one_by_one(structure, engine), 64
+
+
+def one_by_one(structure: Structure, engine: Engine) -> Block:
+    """Return what runs the loops of a block one after the other."""
+    bare = structure.bare()
+
+    def run(
+        values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: npt.NDArray[np.int64], at: int, records: Floats
+    ) -> None:
+        scans, rows = records.shape[1], rings.shape[1]
+        for i in range(records.shape[2]):
+            program = replace(bare, values=tuple(values[:, i].tolist()), initial=tuple(states[:, i].tolist()))
+            places = [(at - np.arange(length, 0, -1)) % rows for length in lengths[:, i]]  # the oldest first
+            lines = [deque(ring[place, i].tolist()) for ring, place in zip(rings, places, strict=True)]
+            state: list[Any] = [*python.starting(program), *lines]
+            records[:, :, i] = runner(program, engine).run(state, list(signals[:, :, i]), scans)
+            states[:, i] = state[: len(structure.states)]
+            for ring, length, line in zip(rings, lengths[:, i], lines, strict=True):
+                ring[(at + scans - np.arange(length, 0, -1)) % rows, i] = list(line)
+
+    return run

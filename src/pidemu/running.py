@@ -134,27 +134,20 @@ class Running:
             self[name] = old[name]
         if not last or not new:
             return
-        rest = self._resting(last, old["u"])
+        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        rest = _resting(other, self._by_hand(last, old["u"]))
         rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
         for name in new:
             self[name] = rest.get(name, self[name])
         if "I" in new:
-            self["I"] = self._left_for_the_integral(last, old["u"])
+            other.reset()
+            self["I"] = self._left_for_the_integral(other, last, old["u"])
 
     def _by_hand(self, last: Mapping[str, float], u: float) -> dict[str, float]:
         return {**last, "auto": 0.0, "manual": u, "track": nan}
 
-    def _resting(self, last: Mapping[str, float], u: float) -> dict[str, float]:
-        """Return the states of a controller that has had the last signals for ever, in manual."""
-        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
-        other["u"] = u
-        with other.quiet():
-            other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
-        return other.named()
-
-    def _left_for_the_integral(self, last: Mapping[str, float], u: float) -> float:
-        """Return the integral with which the output stays where it is."""
-        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+    def _left_for_the_integral(self, other: Running, last: Mapping[str, float], u: float) -> float:
+        """Return the integral with which the output stays where it is; `other` is this controller at rest."""
         if "I" not in other:  # a loaded sum without integral action
             self["I"] = 0.0
             return u - self.would_be(last, "v")
@@ -172,6 +165,14 @@ class Running:
             moved = old.would_be(last, "P") - self.would_be(last, "P")
             if not isnan(moved):
                 self["I"] += moved
+
+
+def _resting(other: Running, by_hand: Mapping[str, float]) -> dict[str, float]:
+    """Return the states of a controller that has had the last signals for ever, in manual."""
+    other["u"] = by_hand["manual"]
+    with other.quiet():
+        other.compiled.scan(other.state, *other.inputs(by_hand))
+    return other.named()
 
 
 def resting(a: Algorithm) -> Algorithm:

@@ -124,6 +124,7 @@ class Settings(Mapping[str, Value]):
     op_range: tuple[float, float] | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
+    _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
         return self.values_by_name[name]
@@ -223,7 +224,10 @@ class Settings(Mapping[str, Value]):
         """
         from pidemu.canonical import algorithm_of  # numbers are made from settings, not settings from numbers
 
-        return algorithm_of(self, own_units=own_units, scan=scan)
+        key = (own_units, scan)
+        if key not in self._algorithms:
+            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan)
+        return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:
         """Return card, active settings and options as plain values, for JSON."""

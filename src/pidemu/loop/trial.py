@@ -128,6 +128,8 @@ def trial(
 ) -> Trial:
     """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
     h = float(scan) if scan is not None else scan_for(settings, process)
+    if not 0 < h < math.inf:
+        raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
     length = _duration(settings, process, h) if time is None else float(time)
     if not 0 < length < math.inf or not length < _MOST_SCANS * h:
         raise ProcessError(f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses")

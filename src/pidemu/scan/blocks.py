@@ -78,11 +78,14 @@ class Builder:
 
     def _live(self) -> set[str]:
         """Return every name that the output depends on, in this scan or by way of a state in a later one."""
+        reads: dict[str, set[str]] = {}
+        for assign in self._body:
+            reads.setdefault(assign.name, set()).update(names_in(assign.value))
         live: set[str] = set()
         found = {"u"}
-        while found - live:
+        while found:
             live |= found
-            found = {name for assign in self._body if assign.name in live for name in names_in(assign.value)}
+            found = {name for reader in found for name in reads.get(reader, ())} - live
         return live
 
     def program(self, a: Algorithm) -> Program:

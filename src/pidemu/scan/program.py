@@ -6,7 +6,6 @@ both sides are numbers. Truth values are numbers too where they are kept in a st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -126,19 +125,21 @@ def equal(left: Operand, right: Operand) -> Expr:
     return Binary("==", expr(left), expr(right))
 
 
-def names_in(x: Expr) -> Iterator[str]:
-    """Yield every name that an expression reads."""
-    match x:
-        case Name(id=name):
-            yield name
-        case Select(condition=condition, yes=yes, no=no):
-            for part in (condition, yes, no):
-                yield from names_in(part)
-        case Binary(left=left, right=right):
-            yield from names_in(left)
-            yield from names_in(right)
-        case Floor(operand=operand) | Cast(operand=operand):
-            yield from names_in(operand)
+def names_in(x: Expr) -> set[str]:
+    """Return every name that an expression reads."""
+    found: set[str] = set()
+    left = [x]
+    while left:
+        match left.pop():
+            case Name(id=name):
+                found.add(name)
+            case Select(condition=condition, yes=yes, no=no):
+                left += (condition, yes, no)
+            case Binary(left=one, right=other):
+                left += (one, other)
+            case Floor(operand=operand) | Cast(operand=operand):
+                left.append(operand)
+    return found
 
 
 @dataclass(frozen=True, slots=True)

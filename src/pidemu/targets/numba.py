@@ -65,7 +65,7 @@ def block(structure: Structure) -> Block:
     ) -> None:
         assert states.flags.c_contiguous
         assert rings.flags.c_contiguous
-        assert records.flags.c_contiguous  # what is written to must not be a copy
+        assert all(x.flags.c_contiguous for x in records)  # what is written to must not be a copy
         rows = [np.ravel(x) for parts in (signals, rings, lengths) for x in parts]
         left = [np.empty(WIDTH) for _ in rings]
         function(np.ravel(values), np.ravel(states), at, *rows, *left, *(np.ravel(x) for x in records))

@@ -1,0 +1,127 @@
+"""``Fleet``: many closed loops at once."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Generator, Iterable
+from pathlib import Path
+from typing import Any
+
+from pidemu.engines import Engine, checked
+from pidemu.errors import FleetError
+from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.local import outcomes
+from pidemu.fleet.loops import Loop, Plan, unique
+from pidemu.fleet.prepare import Failed
+from pidemu.fleet.progress import Progress
+from pidemu.fleet.result import FleetResult
+from pidemu.fleet.signals import SignalStore
+from pidemu.loop.trial import Step
+
+
+class Fleet:
+    """Closed loops of different cards, settings, scan intervals and processes.
+
+    Parameters
+    ----------
+    loops : iterable of Loop
+        The loops, each with its own tag.
+
+    Raises
+    ------
+    FleetError
+        There are none, or two have the same tag.
+
+    Examples
+    --------
+    >>> import pidemu
+    >>> card, process = pidemu.load_card("generic/standard"), pidemu.Process.from_lags(1.0, lags=[10], delay=2)
+    >>> loops = [pidemu.Loop(f"TIC-{i}", card.settings(K=i, Ti=10, Td=0), process, scan=0.1) for i in (1, 2)]
+    >>> result = pidemu.Fleet(loops).simulate(setpoint=0, load=(10, 5), time=200)
+    >>> result.columns["iae"].round(1).tolist()  # 5 Ti/K where the error does not change its sign
+    [50.0, 25.0]
+    """
+
+    def __init__(self, loops: Iterable[Loop]) -> None:
+        self.loops = unique(loops)
+
+    def __len__(self) -> int:
+        return len(self.loops)
+
+    def simulate(
+        self,
+        *,
+        setpoint: float | Step = 10.0,
+        load: float | Step = 10.0,
+        time: float | None = None,
+        keep: bool = False,
+        folder: str | Path | None = None,
+        parquet: str | Path | None = None,
+        engine: Engine | None = None,
+        cores: int | None = None,
+        cluster: Any = None,
+        progress: bool | None = None,
+    ) -> FleetResult:
+        """Run every loop from rest, as `pidemu.simulate` does, and with its numbers.
+
+        A loop that cannot be run is reported in the result and does not stop the others. Where the run is interrupted (Ctrl-C),
+        what is done by then is returned.
+
+        Parameters
+        ----------
+        setpoint, load : float or tuple of float
+            Steps for loops that have none of their own: sizes [%], or when [s] and size, as in `pidemu.simulate`.
+        time : float, optional
+            How long, for loops that do not say [s]; by default as long as each takes to settle.
+        keep : bool
+            Keep measurement and output of every scan.
+        folder : str or Path, optional
+            Keep them in files of this folder, not in memory (NumPy files, one per block of loops).
+        parquet : str or Path, optional
+            Write table and signals to this Parquet file, a row per loop (needs the extra ``parquet``).
+        engine : {"python", "numpy", "numba", "c"}, optional
+            What runs the loops; all give the same bits. By default the quickest for each group of loops.
+        cores : int, optional
+            Threads on this machine; by default one per core.
+        cluster : str or distributed.Client or distributed cluster, optional
+            Run on a Dask cluster: the scheduler's address, a client, or a cluster (needs the extra ``cluster``).
+        progress : bool, optional
+            Show a progress bar on standard error; by default where that is a terminal and the fleet is large.
+
+        Returns
+        -------
+        FleetResult
+            The table, and the signals where they are kept.
+
+        Raises
+        ------
+        FleetError
+            The fleet cannot be run so.
+        EngineError
+            The engine is not there.
+        """
+        if cores is not None and cores < 1:
+            raise FleetError(f"{cores} cores cannot run anything; give at least 1")
+        result = FleetResult(self.loops)
+        store = SignalStore(folder, parquet) if keep or folder is not None or parquet is not None else None
+        plan = Plan(setpoint, load, time, store is not None, checked(engine))
+        with contextlib.ExitStack() as stack:
+            bar = stack.enter_context(Progress(len(self.loops), progress))
+            if store is not None:
+                stack.enter_context(store)
+            found = stack.enter_context(contextlib.closing(self._outcomes(plan, cores, cluster, store)))
+            try:
+                for one in found:
+                    kept = one if store is None or isinstance(one, Failed) else store.stored(one)
+                    bar.advance(result.add(kept))
+            except KeyboardInterrupt:
+                result.interrupted = True
+        return result
+
+    def _outcomes(self, plan: Plan, cores: int | None, cluster: Any, store: SignalStore | None) -> Generator[Outcome | Failed]:
+        loops = enumerate(self.loops)
+        if cluster is None:
+            return outcomes(loops, plan, cores=cores, room=None if store is None else store.room)
+        from pidemu.fleet.cluster import outcomes_on
+
+        return outcomes_on(cluster, loops, plan)

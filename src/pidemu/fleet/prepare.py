@@ -1,0 +1,123 @@
+"""Loops as programs, grouped by what they have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from pidemu.errors import PidemuError
+from pidemu.fleet.loops import Loop, Plan
+from pidemu.loop.experiment import Measuring, Steps, experiment
+from pidemu.loop.trial import Trial
+from pidemu.scan.program import Program, Structure
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A loop ready to run: the numbers of its program.
+
+    Attributes
+    ----------
+    place : int
+        Its place in the fleet.
+    tag : str
+        Its name.
+    trial : Trial
+        What runs.
+    structure : Structure
+        What its program shares with others.
+    values, initial : tuple of float
+        Coefficients, and states before the first scan.
+    lengths : tuple of int
+        Scans that each delay line delays by.
+    """
+
+    place: int
+    tag: str
+    trial: Trial
+    structure: Structure
+    values: tuple[float, ...]
+    initial: tuple[float, ...]
+    lengths: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A loop that cannot be run.
+
+    Attributes
+    ----------
+    place : int
+        Its place in the fleet.
+    reason : str
+        Why.
+    """
+
+    place: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Group:
+    """Loops that share a structure and a number of scans.
+
+    Attributes
+    ----------
+    structure : Structure
+        What their programs have in common.
+    scans : int
+        How many scans each does.
+    members : tuple of Prepared
+        The loops, by dead time, so that a block's delay lines are of like length.
+    """
+
+    structure: Structure
+    scans: int
+    members: tuple[Prepared, ...]
+
+
+def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> Iterator[Prepared | Failed]:
+    """Yield each loop as a program, or why it cannot be run.
+
+    Parameters
+    ----------
+    loops : iterable of (int, Loop)
+        Loops with their places in the fleet.
+    plan : Plan
+        What is done to them.
+    """
+    shared: dict[Structure, Structure] = {}
+    for place, loop in loops:
+        try:
+            trial = plan.trial(loop)
+            program = measured(trial)
+            structure = shared.setdefault(program.structure, program.structure)
+            yield Prepared(place, loop.tag, trial, structure, program.values, program.initial, program.lengths)
+        except PidemuError as error:
+            yield Failed(place, str(error))
+
+
+def measured(trial: Trial) -> Program:
+    """Return a trial as a program that makes its own steps and figures; errors count from the load step on, or from the start."""
+    at, sizes = [], []
+    for step in (trial.setpoint_step, trial.load_step):
+        at.append(trial.scans if step is None else trial.first(step[0]))
+        sizes.append(0.0 if step is None else step[1])
+    start = 0 if trial.load_step is None else at[1]
+    measuring = Measuring(trial.scan, start, trial.initial[2], trial.limits)
+    loop = trial.program(trial.controller())
+    return experiment(loop, Steps(trial.initial[0], sizes[0], at[0], sizes[1], at[1]), measuring)
+
+
+def grouped(members: Iterable[Prepared]) -> list[Group]:
+    """Return the loops by structure and number of scans.
+
+    Parameters
+    ----------
+    members : iterable of Prepared
+        Loops that were prepared together, so that like ones share their structure.
+    """
+    found: dict[tuple[int, int], list[Prepared]] = {}
+    for member in members:
+        found.setdefault((id(member.structure), member.trial.scans), []).append(member)
+    return [Group(some[0].structure, some[0].trial.scans, tuple(sorted(some, key=lambda m: m.lengths))) for some in found.values()]

@@ -1,0 +1,160 @@
+"""What came of a fleet: a table, and the signals where they were kept."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.errors import FleetError, suggest
+from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.loops import Loop
+from pidemu.fleet.prepare import Failed
+from pidemu.loop.trial import Trial
+
+Floats = npt.NDArray[np.float64]
+Status = Literal["done", "ran away", "failed", "not run"]
+HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "engine", "reason")
+"""Columns of the table. Times are in seconds, signals in percent."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The signals of one loop.
+
+    Attributes
+    ----------
+    times, setpoint, measurement, output : ndarray, shape (scans,)
+        Times of the scans [s], and the signals there [%].
+    """
+
+    times: Floats
+    setpoint: Floats
+    measurement: Floats
+    output: Floats
+
+
+class FleetResult:
+    """What came of a fleet, loop by loop, in the fleet's order.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        The fleet.
+
+    Attributes
+    ----------
+    loops : tuple of Loop
+        The fleet.
+    status : list of str
+        ``"done"``; ``"ran away"``: done, and the measurement outgrew all numbers; ``"failed"``: it could not be run; ``"not run"``:
+        the run was interrupted before.
+    reasons : list of str
+        Why a loop failed.
+    columns : dict of str to ndarray, shape (loops,)
+        ``iae`` [% s], ``peak`` [%], ``travel`` [%], ``at_low``, ``at_high`` [s] and the last ``error`` [%]; NaN where a loop
+        did not run. The errors count from the load step on, or from the start where there is none.
+    scan, scans : ndarray, shape (loops,)
+        Scan intervals [s] and numbers of scans.
+    engines : list of str
+        What ran each loop.
+    interrupted : bool
+        Whether the run was interrupted; what was done by then is here.
+    """
+
+    def __init__(self, loops: Sequence[Loop]) -> None:
+        self.loops = tuple(loops)
+        count = len(self.loops)
+        self.status: list[Status] = ["not run"] * count
+        self.reasons, self.engines = [""] * count, [""] * count
+        self.columns: dict[str, Floats] = {name: np.full(count, np.nan) for name in COLUMNS}
+        self.scan, self.scans = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
+        self.interrupted = False
+        self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
+        self._signals: dict[int, tuple[Trial, Floats, int]] = {}
+
+    def add(self, found: Outcome | Failed) -> int:
+        """Take what came of a block, or of a loop that failed; return how many loops that is."""
+        if isinstance(found, Failed):
+            self.status[found.place], self.reasons[found.place] = "failed", found.reason
+            return 1
+        places = [m.place for m in found.members]
+        for name, column in found.columns.items():
+            self.columns[name][places] = column
+        for i, member in enumerate(found.members):
+            place = member.place
+            self.status[place] = "ran away" if place in found.ran_away else "done"
+            self.scan[place], self.scans[place] = member.trial.scan, member.trial.scans
+            self.engines[place] = found.engine.engine
+            if found.records is not None:
+                self._signals[place] = (member.trial, found.records, i)
+        return len(places)
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why loops failed, by tag."""
+        return {loop.tag: why for loop, why, is_ in zip(self.loops, self.reasons, self.status, strict=True) if is_ == "failed"}
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """How many loops have each status."""
+        return Counter(self.status)
+
+    def __len__(self) -> int:
+        return len(self.loops)
+
+    def __getitem__(self, tag: str) -> Signals:
+        """Return the signals of a loop.
+
+        Raises
+        ------
+        FleetError
+            There is no such loop, it was not run, or the signals were not kept.
+        """
+        place = self._places.get(tag)
+        if place is None:
+            raise FleetError(f"there is no loop '{tag}'{suggest(tag, self._places)} in the fleet")
+        if place not in self._signals:
+            done = self.status[place] in ("done", "ran away")
+            raise FleetError(
+                f"the signals of loop '{tag}' were not kept; run the fleet with keep=True"
+                if done
+                else f"loop '{tag}' has no signals: {self.reasons[place] or self.status[place]}"
+            )
+        trial, records, lane = self._signals[place]
+        return Signals(trial.times, trial.setpoint, records[1, :, lane], records[0, :, lane])
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""
+        for i, loop in enumerate(self.loops):
+            ran = self.status[i] in ("done", "ran away")
+            figures = {name: float(column[i]) if ran else None for name, column in self.columns.items()}
+            yield {
+                "tag": loop.tag,
+                "card": loop.settings.card.id,
+                "status": self.status[i],
+                "scan": float(self.scan[i]) if ran else None,
+                "scans": int(self.scans[i]) if ran else None,
+                **figures,
+                "engine": self.engines[i] or None,
+                "reason": self.reasons[i] or None,
+            }
+
+    def write_table(self, path: str | Path) -> None:
+        """Write the table as CSV; numbers are written so that they read back the same.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        """
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, HEADER)
+            writer.writeheader()
+            writer.writerows(self.rows())
