@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -76,8 +78,8 @@ class Group:
     members: tuple[Prepared, ...]
 
 
-def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> Iterator[Prepared | Failed]:
-    """Yield each loop as a program, or why it cannot be run.
+def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> list[Prepared | Failed]:
+    """Return each loop as a program, or why it cannot be run.
 
     Parameters
     ----------
@@ -87,14 +89,32 @@ def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> Iterator[Prepared
         What is done to them.
     """
     shared: dict[Structure, Structure] = {}
-    for place, loop in loops:
-        try:
-            trial = plan.trial(loop)
-            program = measured(trial)
-            structure = shared.setdefault(program.structure, program.structure)
-            yield Prepared(place, loop.tag, trial, structure, program.values, program.initial, program.lengths)
-        except PidemuError as error:
-            yield Failed(place, str(error))
+    with _no_collection():
+        return [_prepared(place, loop, plan, shared) for place, loop in loops]
+
+
+def _prepared(place: int, loop: Loop, plan: Plan, shared: dict[Structure, Structure]) -> Prepared | Failed:
+    try:
+        trial = plan.trial(loop)
+        program = measured(trial)
+    except PidemuError as error:
+        return Failed(place, str(error))
+    structure = program.structure
+    return Prepared(
+        place, loop.tag, trial, shared.setdefault(structure, structure), program.values, program.initial, program.lengths
+    )
+
+
+@contextlib.contextmanager
+def _no_collection() -> Iterator[None]:
+    """Make many objects without looking for circles among them after every few hundred: there are none."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def measured(trial: Trial) -> Program:

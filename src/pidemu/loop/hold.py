@@ -129,9 +129,7 @@ def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], dela
     if fraction < _WHOLE * h:
         fraction = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
-        whole, _ = _expm1(A, B, h)
-        after, late = _expm1(A, B, h - fraction)
-        _, begun = _expm1(A, B, fraction)
+        (whole, after, _), (_, late, begun) = _expm1(A, B, (h, h - fraction, fraction))
         early = begun + after @ begun
     if not all(np.isfinite(x).all() for x in (whole, late, early)):
         raise ProcessError(f"the process outgrows all numbers within one scan of {h:g} s; give a shorter scan interval")
@@ -174,15 +172,16 @@ def _outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats
     return np.array(row, dtype=np.float64), float(rest[0])
 
 
-def _expm1(A: Floats, B: Floats, t: float) -> tuple[Floats, Floats]:
-    """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B``, by series and doubling: ``F(2t) = 2 F(t) + F(t)^2``.
+def _expm1(A: Floats, B: Floats, times: Sequence[float]) -> tuple[Floats, Floats]:
+    """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B`` for several times, by series and doubling.
 
-    Nothing cancels in the doubling of F, as it would in the squaring of ``exp(A t)``.
+    ``F(2t) = 2 F(t) + F(t)^2``: nothing cancels in that, as it would in the squaring of ``exp(A t)``.
     """
     n = B.size
-    X = np.zeros((n + 1, n + 1))
-    X[:n, :n], X[:n, n] = A * t, B * t
-    size = float(np.abs(X).sum(axis=1).max())
+    X = np.zeros((len(times), n + 1, n + 1))
+    t = np.array(times)
+    X[:, :n, :n], X[:, :n, n] = A * t[:, None, None], B * t[:, None]
+    size = float(np.abs(X).sum(axis=2).max())
     doublings = max(0, math.ceil(math.log2(2 * size))) if size else 0
     X /= 2.0**doublings
     F = term = X
@@ -191,4 +190,4 @@ def _expm1(A: Floats, B: Floats, t: float) -> tuple[Floats, Floats]:
         F = F + term
     for _ in range(doublings):
         F = 2 * F + F @ F
-    return F[:n, :n], F[:n, n]
+    return F[:, :n, :n], F[:, :n, n]
