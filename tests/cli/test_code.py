@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import random
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import pidemu
 from pidemu.card.library import card_files
-from tests.cli.helpers import told
+from tests.cli.helpers import said, told
+from tests.targets.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
 
 Scan = tuple[float, float, bool, float | None]
 
@@ -78,3 +81,89 @@ def test_the_printed_module_imports_nothing() -> None:
 def test_two_calls_print_the_same() -> None:
     words = ("code", "honeywell/udc", "PB=50", "RSET=20", "MINorRPM=RPM")
     assert told(*words) == told(*words)
+
+
+# --- C, and files ---------------------------------------------------------------------------------------------------------------
+
+_PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.5")
+_MAIN = """
+#include <math.h>
+#include <stdio.h>
+#include "level.h"
+
+int main(void)
+{
+    level_state state;
+    int i;
+    level_init(&state);
+    for (i = 0; i < 60; i++)
+        printf("%.17g\\n", level_step(&level_default, &state, 50.0 + i % 7, 48.0 - 0.1 * i, i > 9, i > 4 ? 30.0 : NAN));
+    return 0;
+}
+"""
+
+
+def outputs_of(folder: Path, compiler: str | None, *flags: str) -> list[float]:
+    """Compile the two files with the program above, which uses the header only, and run it."""
+    (folder / "main.c").write_text(_MAIN, encoding="utf-8")
+    for file in ("level.c", "main.c"):
+        assert refused(*flags, "-O2", "-ffp-contract=off", *WARNINGS, "-c", file, compiler=compiler, folder=folder) == ""
+    assert refused("level.o", "main.o", "-o", "main", "-lm", compiler=compiler, folder=folder) == ""
+    printed = subprocess.run([folder / "main"], capture_output=True, text=True, check=True).stdout
+    return [float(line) for line in printed.splitlines()]
+
+
+def outputs_of_the_controller() -> list[float]:
+    controller = pidemu.Controller(pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.5))
+    return [controller.scan(50.0 + i % 7, 48.0 - 0.1 * i, i > 9, 30.0 if i > 4 else None) for i in range(60)]
+
+
+@needs_compiler
+def test_the_two_files_build_with_a_c_program_and_give_the_controllers_outputs(folder: Path) -> None:
+    told("code", *_PROVOX, "--lang", "c", "--out", str(folder), "--name", "level")
+    assert outputs_of(folder, COMPILER, "-std=c99") == outputs_of_the_controller()
+
+
+@needs_cpp
+def test_they_build_with_a_cpp_program_as_well(folder: Path) -> None:
+    told("code", *_PROVOX, "--lang", "c", "--out", str(folder), "--name", "level")
+    assert outputs_of(folder, CPP, "-std=c++11", "-x", "c++") == outputs_of_the_controller()
+
+
+@needs_compiler
+def test_c_on_stdout_compiles_on_its_own(folder: Path) -> None:
+    (folder / "level.c").write_text(told("code", *_PROVOX, "--lang", "c"), encoding="utf-8")
+    assert refused("-std=c99", *WARNINGS, "-c", "level.c", folder=folder) == ""
+
+
+def test_files_are_called_after_the_card_and_their_paths_printed(folder: Path) -> None:
+    where = folder / "new" / "folder"
+    assert (
+        told("code", *_PROVOX, "--lang", "c", "--out", str(where)) == f"{where / 'fisher_provox.h'}\n{where / 'fisher_provox.c'}\n"
+    )
+    assert "fisher_provox_step(" in (where / "fisher_provox.h").read_text()
+    assert told("code", "iec/61131-3-pid", "KP=1", "TR=8", "--out", str(where)) == f"{where / 'iec_61131_3_pid.py'}\n"
+    assert (where / "iec_61131_3_pid.py").read_text() == told("code", "iec/61131-3-pid", "KP=1", "TR=8")
+
+
+def test_scan_interval_action_and_limits_are_in_the_c(folder: Path) -> None:
+    text = told("code", *_PROVOX, "--lang", "c", "--scan", "0.25", "--action", "direct", "--limits", "10,90")
+    assert text.splitlines()[1].endswith("; scan 0.25 s, direct acting")
+    values = text[text.index("fisher_provox_default = {") :].splitlines()[1:4]
+    assert [line.split()[0] for line in values] == ["10.0,", "90.0,", "-2.0,"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--lang c --name 2nd", "error: '2nd' is no name in C; give letters, digits and single underscores, a letter first\n"),
+        ("--lang c --name double", "error: 'double' is a word of C or C++; give another name, such as double_control\n"),
+        ("--name level", "--name names the file of a Python module; give --out as well\n"),
+        ("--lang c --out taken/inside", "error: taken/inside/fisher_provox.h: cannot be written: Not a directory\n"),
+    ],
+)
+def test_what_cannot_be_printed_is_told(folder: Path, words: str, message: str) -> None:
+    (folder / "taken").write_text("", encoding="utf-8")
+    found = said("code", *_PROVOX, *words.split())
+    assert (found.status, found.out) == (2, "")
+    assert found.err.endswith(message)

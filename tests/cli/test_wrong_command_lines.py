@@ -227,7 +227,7 @@ def test_an_unknown_command_is_refused_with_the_nearest_one() -> None:
         ("show fisher/provox --josn", "--json"),
         ("cards deltav provox", "provox"),
         (f"convert {_PI} --to", "--to"),
-        (f"code {_PI} --lang c", "'c'"),
+        (f"code {_PI} --lang ada", "'ada'"),
     ],
 )
 def test_click_s_own_messages_name_the_word(line: str, word: str) -> None:

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import action_option, assignments, limits_option, vendors_option
 from pidemu.emulator import Controller
+from pidemu.errors import PidemuError
+from pidemu.scan.program import Program
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
-@click.option("--lang", type=click.Choice(["python"]), default="python", show_default=True, help="Language.")
+@click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
+@click.option("--name", metavar="NAME", help="What files, types and functions are called; by default after the card.")
+@click.option("--out", type=click.Path(file_okay=False), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option
 @limits_option
@@ -20,15 +27,60 @@ from pidemu.emulator import Controller
 def command(
     card: str,
     values: tuple[str, ...],
-    lang: str,  # noqa: ARG001 (one language so far; the choice is checked)
+    lang: str,
+    name: str | None,
+    out: str | None,
     scan: float | None,
     action: str,
     limits: tuple[float, float] | None,
     vendors: tuple[str, ...],
 ) -> None:
     """Print what CARD with the settings NAME=VALUE does in one scan, as a module that runs on its own."""
+    from pidemu.targets.c import check_name
+
+    if name is not None and lang == "python" and out is None:
+        raise click.UsageError("--name names the file of a Python module; give --out as well")
+    if name is not None:
+        check_name(name)
+    loaded = load_card(card, vendors)
+    settings = loaded.settings(assignments(values))
+    program = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits).program
+    name = name or _name(loaded.id)
+    if out is None:
+        click.echo(_printed(program, lang, name), nl=False)
+        return
+    for file, text in _files(program, lang, name).items():
+        _write(Path(out) / file, text)
+
+
+def _name(card_id: str) -> str:
+    """Return a name in C after a card: its letters and digits, one underscore for anything else."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", card_id).strip("_")
+    return name if name[:1].isalpha() else f"pid_{name}"
+
+
+def _printed(program: Program, lang: str, name: str) -> str:
+    if lang == "c":
+        from pidemu.targets.c import single
+
+        return single(program, name)
     from pidemu.targets.python import source
 
-    settings = load_card(card, vendors).settings(assignments(values))
-    controller = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits)
-    click.echo(source(controller.program), nl=False)
+    return source(program)
+
+
+def _files(program: Program, lang: str, name: str) -> dict[str, str]:
+    if lang == "c":
+        from pidemu.targets.c import header, source
+
+        return {f"{name}.h": header(program, name), f"{name}.c": source(program, name)}
+    return {f"{name}.py": _printed(program, lang, name)}
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise PidemuError(f"{path}: cannot be written: {error.strerror}") from None
+    click.echo(path)
