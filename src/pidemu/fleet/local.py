@@ -7,13 +7,17 @@ import os
 import threading
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Final
+from typing import Any, Final
 
 from pidemu.engines import block, for_loops
 from pidemu.fleet.blocks import Outcome, Room, run_block
 from pidemu.fleet.loops import Loop, Plan
 from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared
+from pidemu.targets.runner import Block
 
+_ONE_AT_A_TIME: Final = ("python", "numpy")
+"""Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""
+_TURN: Final = threading.Lock()
 _AT_ONCE: Final = 8192
 """Loops that are prepared, and then run, at a time: what is in memory does not grow with the fleet."""
 
@@ -68,9 +72,19 @@ def outcomes(
 def _started(pool: ThreadPoolExecutor, group: Group, plan: Plan, room: Room | None, stop: threading.Event) -> set[Future[Outcome]]:
     choice = for_loops(group.structure, group.scans, len(group.members), plan.engine)
     function, most = block(group.structure, choice.engine)
+    if choice.engine in _ONE_AT_A_TIME:
+        function = _in_turn(function)
     width = most if choice.engine == "numba" else min(most, len(group.members))
     parts = (group.members[start : start + width] for start in range(0, len(group.members), width))
     return {pool.submit(run_block, group, part, choice, function, width, room, stop.is_set) for part in parts}
+
+
+def _in_turn(function: Block) -> Block:
+    def run(*arguments: Any, **named: Any) -> None:
+        with _TURN:
+            function(*arguments, **named)
+
+    return run
 
 
 def _done(under_way: set[Future[Outcome]]) -> Iterator[Outcome]:

@@ -156,6 +156,7 @@ def _over(program: Program, values: Floats, function: Callable[..., None]) -> Ru
         state[:count] = [kind(x) for kind, x in zip(map(type, state), states.tolist(), strict=False)]
         for held, line in zip(state[count:], lines, strict=True):
             oldest = scans % line.size
+            held.clear()
             held.extend(chain(line[oldest:].tolist(), line[:oldest].tolist()))
         return records
 

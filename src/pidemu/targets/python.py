@@ -35,8 +35,10 @@ def _body(program: Program, indent: str) -> list[str]:
 
 
 def _rounded_inputs(program: Program, indent: str) -> list[str]:
-    narrow = [q.name for q in program.inputs if not program.is_wide(q.name)]
-    return [f"{indent}{', '.join(narrow)} = {', '.join(f'float32({name})' for name in narrow)}"] if narrow else []
+    if program.precision == "float64" or not program.inputs:
+        return []
+    names = [q.name for q in program.inputs]
+    return [f"{indent}{', '.join(names)} = {', '.join(f'{_precision(program, name)}({name})' for name in names)}"]
 
 
 def _states(program: Program) -> str:
