@@ -46,7 +46,7 @@ def specialise(program: Program, known: Mapping[str, float] = IN_AUTOMATIC) -> P
             environment.pop(assign.name, None)
         if not (isinstance(value, Number) and known.get(assign.name) == value.value):
             kept.append(replace(assign, value=value))
-    live = {q.name for q in program.states} | {program.output}
+    live = {q.name for q in program.states} | set(program.recorded) | {line.source for line in program.lines}
     body: list[Assign] = []
     for assign in reversed(kept):
         if assign.name in live:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 from pidemu.scan.program import Binary, Cast, Expr, Floor, Name, Number, Select
@@ -20,43 +21,66 @@ def literal(value: float) -> str:
     return repr(value) if math.isfinite(value) else f'float("{value!r}")'
 
 
-def render(x: Expr, *, for_compiler: bool = False) -> str:
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How expressions are written.
+
+    Attributes
+    ----------
+    typed : bool
+        For Numba: a float32 number of the text says so, since there it does not give way to the other operand by itself.
+    branchless : bool
+        Truth values are combined without branches, so that a compiler can compute several loops at once.
+    """
+
+    typed: bool = False
+    branchless: bool = False
+
+
+PYTHON: Final = Dialect()
+NUMBA: Final = Dialect(typed=True)
+NUMBA_BLOCK: Final = Dialect(typed=True, branchless=True)
+
+
+def render(x: Expr, dialect: Dialect = PYTHON) -> str:
     """Return an expression as Python.
 
     Parameters
     ----------
     x : Expr
         What to print.
-    for_compiler : bool
-        For Numba: truth values are combined without branches, and a float32 number of the text says so, since there it does not
-        give way to the other operand by itself.
+    dialect : Dialect
+        For whom.
     """
-    return _render(x, for_compiler)[0]
+    return _render(x, dialect)[0]
 
 
-def _render(x: Expr, strict: bool) -> tuple[str, int]:
+def _render(x: Expr, dialect: Dialect) -> tuple[str, int]:
     match x:
         case Number(value=value):
-            text = str(value) if strict and not math.isfinite(value) else literal(value)
+            text = str(value) if dialect.typed and not math.isfinite(value) else literal(value)
             return text, _ATOM if value >= 0 else 9
         case Name(id=name):
             return name, _ATOM
         case Select(condition=condition, yes=yes, no=no):
-            test, then = (_wrapped(part, 1, strict) for part in (condition, yes))
-            return f"{then} if {test} else {_wrapped(no, _SELECT, strict)}", _SELECT
+            test, then = (_wrapped(part, 1, dialect) for part in (condition, yes))
+            return f"{then} if {test} else {_wrapped(no, _SELECT, dialect)}", _SELECT
         case Cast(operand=operand, precision=precision):
-            return f"{precision}({_render(operand, strict)[0]})", _ATOM
-        case Binary(operator=operator, left=left, right=right):
-            symbol = _BITWISE.get(operator, operator) if strict else operator
-            level = _PRECEDENCE[symbol]
-            compares = level == _PRECEDENCE["<"]  # Python chains comparisons: a < b < c is not (a < b) < c
-            before, after = level + compares, level + (level > _PRECEDENCE["and"])
-            if not strict:
-                left, right = _weak(left), _weak(right)
-            return f"{_wrapped(left, before, strict)} {symbol} {_wrapped(right, after, strict)}", level
+            return f"{precision}({_render(operand, dialect)[0]})", _ATOM
+        case Binary():
+            return _binary(x, dialect)
         case Floor(operand=operand):
-            return f"{_wrapped(operand, _PRECEDENCE['*'], strict)} // 1.0", _PRECEDENCE["/"]
+            return f"{_wrapped(operand, _PRECEDENCE['*'], dialect)} // 1.0", _PRECEDENCE["/"]
     raise TypeError(f"no Python for {type(x).__name__}")
+
+
+def _binary(x: Binary, dialect: Dialect) -> tuple[str, int]:
+    symbol = _BITWISE.get(x.operator, x.operator) if dialect.branchless else x.operator
+    level = _PRECEDENCE[symbol]
+    compares = level == _PRECEDENCE["<"]  # Python chains comparisons: a < b < c is not (a < b) < c
+    before, after = level + compares, level + (level > _PRECEDENCE["and"])
+    left, right = (x.left, x.right) if dialect.typed else (_weak(x.left), _weak(x.right))
+    return f"{_wrapped(left, before, dialect)} {symbol} {_wrapped(right, after, dialect)}", level
 
 
 def _weak(x: Expr) -> Expr:
@@ -64,6 +88,6 @@ def _weak(x: Expr) -> Expr:
     return x.operand if isinstance(x, Cast) and isinstance(x.operand, Number) and x.precision == "float32" else x
 
 
-def _wrapped(x: Expr, least: int, strict: bool) -> str:
-    text, level = _render(x, strict)
+def _wrapped(x: Expr, least: int, dialect: Dialect) -> str:
+    text, level = _render(x, dialect)
     return text if level >= least else f"({text})"

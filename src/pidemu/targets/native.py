@@ -164,7 +164,8 @@ def _over(program: Program, compiled: _Compiled, settings: ctypes.Structure, nam
             raise ValueError(f"signals of shapes {[s.shape for s in samples]} for {scans} scans")
         rings = [_as(kind, list(line)) for kind, line in zip(entering, state[held:], strict=True)]
         now = compiled.state(*map(float, state[:held]), *(x for ring in rings for x in (ring.ctypes.data, ring.size, 0)))
-        outputs = [np.empty(scans, kind) for kind in recorded]
+        records = np.empty((len(recorded), scans))
+        outputs = [row if kind is np.float64 else np.empty(scans, kind) for row, kind in zip(records, recorded, strict=True)]
         function(ctypes.byref(settings), ctypes.byref(now), scans, *(x.ctypes.data for x in (*samples, *outputs)))
         state[:held] = [kind(getattr(now, name)) for name, kind in states]
         for line, ring in zip(state[held:], rings, strict=True):
@@ -172,7 +173,10 @@ def _over(program: Program, compiled: _Compiled, settings: ctypes.Structure, nam
             left = ring.tolist() if program.precision == "float64" else list(ring)
             line.clear()
             line.extend(left[oldest:] + left[:oldest])
-        return np.array(outputs, dtype=np.float64)
+        for row, output in zip(records, outputs, strict=True):
+            if output is not row:
+                row[:] = output
+        return records
 
     return run
 

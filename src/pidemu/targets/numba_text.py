@@ -7,7 +7,7 @@ from typing import Final
 
 from pidemu.scan.precision import explicit
 from pidemu.scan.program import Program, names_in
-from pidemu.targets.expressions import render
+from pidemu.targets.expressions import NUMBA, NUMBA_BLOCK, Dialect, render
 
 WIDTH: Final = 64
 """Loops in a block: a constant of the text, so that the compiler knows that rows are apart and computes several loops at once."""
@@ -43,7 +43,7 @@ def record_text(program: Program, name: str) -> str:
         f"    for n in range({program.output}_out.size):",
         *(_load(program, n, f"{n}_n[n]", _STEP) for n in inputs),
         *(_load(program, n, f"{n}_line[{n}_at]", _STEP) for n in lines),
-        *_body(program, _STEP),
+        *_body(program, NUMBA, _STEP),
     ]
     for line in program.lines:
         at = f"{line.name}_at"
@@ -78,7 +78,7 @@ def block_text(program: Program) -> str:
         *(_load(program, n, "states" + row.format(k), _LOOP) for k, n in enumerate(states)),
         *(_load(program, n, f"{n}_n" + row.format("n"), _LOOP) for n in inputs),
         *(_load(program, n, f"{n}_left[i]", _LOOP) for n in lines),
-        *_body(program, _LOOP),
+        *_body(program, NUMBA_BLOCK, _LOOP),
         *(f"{_LOOP}states{row.format(k)} = {n}" for k, n in enumerate(states)),
         *(f"{_LOOP}{line.name}_ring{row.format(f'{line.name}_row')} = {line.source}" for line in program.lines),
         *(f"{_LOOP}{n}_out{row.format('n')} = {n}" for n in program.recorded),
@@ -111,5 +111,5 @@ def _coefficients(program: Program, place: str, indent: str) -> Iterable[str]:
             yield _load(program, q.name, place.format(k), indent)
 
 
-def _body(program: Program, indent: str) -> Iterable[str]:
-    return (f"{indent}{assign.name} = {render(assign.value, for_compiler=True)}" for assign in explicit(program))
+def _body(program: Program, dialect: Dialect, indent: str) -> Iterable[str]:
+    return (f"{indent}{assign.name} = {render(assign.value, dialect)}" for assign in explicit(program))

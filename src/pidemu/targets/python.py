@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -136,6 +136,10 @@ def source(program: Program) -> str:
     return "\n".join(lines) + "\n"
 
 
+_AT_ONCE: Final = 2048
+"""Scans whose numbers are Python's at a time: more of them would not stay in a processor's cache."""
+
+
 @dataclass(frozen=True, slots=True)
 class Compiled:
     """A program as Python functions.
@@ -227,8 +231,12 @@ def runner(program: Program) -> Runner:
 
     def over(run: Callable[..., Any]) -> Run:
         def record(state: list[Any], signals: Sequence[Floats], scans: int) -> Floats:
-            found = run(state, *(s.tolist() for s in signals)) if signals else run(state, scans)
-            return np.array(found if program.also else [found], dtype=np.float64)
+            records = np.empty((len(program.recorded), scans))
+            for at in range(0, scans, _AT_ONCE):
+                part = slice(at, min(at + _AT_ONCE, scans))
+                found = run(state, *(s[part].tolist() for s in signals)) if signals else run(state, part.stop - at)
+                records[:, part] = found if program.also else [found]
+            return records
 
         return record
 
