@@ -274,7 +274,7 @@ def main() -> None:
     given = parser.parse_args()
     less = 10 if given.quick else 1
     print(
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f} before; the last figure of a line is its ratio to the line with 1.00"
+        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f} before; last in a line: its ratio to the line with 1.00"
     )
     one_loop(10**6 // less, 2 * 10**5 // less, 9)
     fleet(10**4 // less, 1000, 9)

@@ -123,8 +123,11 @@ def impulse(program: Program, path: Literal["feedback", "setpoint"], n: int) -> 
 
 
 def assert_impulse(expected: Floats, actual: Floats) -> None:
-    """Equal to 1e-9 of the largest sample: states carry the rounding (1e-16) of every scan before, and poles near 1 keep it."""
-    assert np.max(np.abs(expected - actual)) <= 1e-9 * np.max(np.abs(expected))
+    """Equal to 1e-9 of the largest sample: states carry the rounding (1e-16) of every scan before, and poles near 1 keep it.
+
+    The law of a path on which nothing acts is not zero but that rounding.
+    """
+    assert np.max(np.abs(expected - actual)) <= 1e-9 * np.max(np.abs(expected)) + 1e-15
 
 
 @on_every_card

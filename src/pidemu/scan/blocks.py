@@ -17,6 +17,8 @@ from pidemu.scan.program import Assign, Binary, Expr, Floor, Name, Operand, Prog
 
 TINY: Final = 1e-300
 """States smaller than this are set to zero: denormal numbers make a scan many times slower (specs/equations.md, section 7)."""
+TINY_SINGLE: Final = 1e-37
+"""The same for float32."""
 
 _AGO: Final = {1: "at the last scan", 2: "two scans ago"}
 INPUTS: Final = (
@@ -36,12 +38,13 @@ EXTRA_INPUTS: Final = {
 
 
 class Builder:
-    """Collects a program's parts in order; `sign` is -1 for direct action."""
+    """Collects a program's parts in order; `sign` is -1 for direct action, `tiny` what `flushed` takes for zero."""
 
-    def __init__(self, title: str, signals: Sequence[str] = (), sign: float = 1.0) -> None:
+    def __init__(self, title: str, signals: Sequence[str] = (), sign: float = 1.0, tiny: float = TINY) -> None:
         self.title = title
         self.signals = signals
         self.sign = sign
+        self.tiny = tiny
         self._coefficients: dict[str, tuple[Quantity, float]] = {}
         self._states: dict[str, tuple[Quantity, float]] = {}
         self._body: list[Assign] = []
@@ -107,9 +110,9 @@ class Builder:
         )
 
 
-def flushed(x: Expr) -> Expr:
+def flushed(x: Expr, tiny: float = TINY) -> Expr:
     """Return `x`, or zero where it is denormally small (section 7); NaN stays NaN."""
-    return select((x > -TINY) & (x < TINY), 0.0, x)
+    return select((x > -tiny) & (x < tiny), 0.0, x)
 
 
 def limited(x: Expr, low: Expr, high: Expr) -> Expr:
@@ -196,7 +199,7 @@ def lag(b: Builder, x: Expr, afresh: Expr, Tf: float, h: float, rule: Rule, orde
     weighted += [(f"{what}_a{n}", poles[n - 1], state) for n, state in enumerate(old, 1)]
     words = f"weight in the filter on the {what}"
     total = summed([b.coefficient(name, weight, words, "-") * signal for name, weight, signal in weighted if weight])
-    result = b.let(f"{what}_f", flushed(b.let(f"{what}_f", total, "weighted sum")), text)
+    result = b.let(f"{what}_f", flushed(b.let(f"{what}_f", total, "weighted sum"), b.tiny), text)
     for line, newest in ((old, result), (signals, x)):
         for n in reversed(range(len(line))):
             b.let(line[n].id, line[n - 1] if n else newest, "shift the filter's history")
@@ -287,7 +290,7 @@ def derivative(b: Builder, x: Expr, afresh: Expr, a: Algorithm, gain: float, Tf:
         share = b.coefficient("D_decay", decay, "decay of the filtered derivative per scan", "-")
         k = b.coefficient("D_gain", strength, "kd over the filter's time", "-")
         b.let("D", share * old + k * (x - past[0]), f"derivative, Tf = {Tf:.6g} s, {a.derivative_rule.value} (section 4)")
-        b.let("D", flushed(state), "no denormal numbers (section 7)")
+        b.let("D", flushed(state, b.tiny), "no denormal numbers (section 7)")
     for n in reversed(range(not lagged, history)):
         b.let(past[n].id, past[n - 1], "shift the derivative's history")
     if not lagged:

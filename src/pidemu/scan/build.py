@@ -15,7 +15,7 @@ import numpy as np
 from pidemu.algorithm import Algorithm, check_filters
 from pidemu.card.base import Rule
 from pidemu.errors import ScanError
-from pidemu.scan.blocks import EXTRA_INPUTS, Builder
+from pidemu.scan.blocks import EXTRA_INPUTS, TINY, TINY_SINGLE, Builder
 from pidemu.scan.dahlin import dahlin
 from pidemu.scan.integer import integer
 from pidemu.scan.positional import positional
@@ -68,7 +68,7 @@ def build(
     _check(algorithm, scan, limits, bias, initial_output, signals)
     sign = 1.0 if action == "reverse" else -1.0
     a = replace(algorithm, kp=sign * algorithm.kp, ki=sign * algorithm.ki, kd=sign * algorithm.kd)
-    b = Builder(title, signals, sign)
+    b = Builder(title, signals, sign, TINY_SINGLE if algorithm.precision == "float32" else TINY)
     own_terms = replace(a, kp=0.0, kd=0.0) if a.precision == "integer" else a  # counts have terms of their own
     common = terms(b, own_terms, scan, _representable(limits, a), initial_output)
     if a.dahlin is not None:

@@ -299,7 +299,7 @@ def _after_output(
         reach = blocks.magnitude(gain * t.signals.e)
         b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if a.windup in _FEEDS_BACK:
-        b.let("I", blocks.flushed(state), "no denormal numbers (section 7)")
+        b.let("I", blocks.flushed(state, b.tiny), "no denormal numbers (section 7)")
 
 
 def _share(a: Algorithm, h: float) -> float:

@@ -235,7 +235,8 @@ def runner(program: Program) -> Runner:
             for at in range(0, scans, _AT_ONCE):
                 part = slice(at, min(at + _AT_ONCE, scans))
                 found = run(state, *(s[part].tolist() for s in signals)) if signals else run(state, part.stop - at)
-                records[:, part] = found if program.also else [found]
+                for row, values in zip(records, found if program.also else [found], strict=True):
+                    row[part] = np.fromiter(values, np.float64, len(values))
             return records
 
         return record
