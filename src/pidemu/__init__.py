@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pidemu.fleet.fleet import Fleet
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
+    from pidemu.fleet.table import LoopTable, read_loops
     from pidemu.law import Law
     from pidemu.loop.process import Process
     from pidemu.loop.simulation import Simulation, simulate
@@ -65,6 +66,8 @@ _HOMES = {
     "Fleet": "fleet.fleet",
     "FleetResult": "fleet.result",
     "Loop": "fleet.loops",
+    "LoopTable": "fleet.table",
+    "read_loops": "fleet.table",
     "Law": "law",
     "Process": "loop.process",
     "Record": "record.files",
@@ -88,6 +91,7 @@ __all__ = [
     "FleetResult",
     "Law",
     "Loop",
+    "LoopTable",
     "PidemuError",
     "Process",
     "ProcessError",
@@ -104,6 +108,7 @@ __all__ = [
     "compare",
     "convert",
     "load_card",
+    "read_loops",
     "read_record",
     "readings",
     "simulate",

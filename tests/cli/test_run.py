@@ -422,3 +422,19 @@ def test_json_goes_to_the_screen_and_the_record_to_its_file(folder: Path) -> Non
     out = recorded(folder, RECORD, "--json", "-o", "out.csv").out
     assert strict_json(out)["outputs"] == emulated((folder / "out.csv").read_text(encoding="utf-8"))
     assert strict_json(out)["difference"] is None
+
+
+def test_an_engine_is_forced_and_named_and_gives_the_same_outputs(folder: Path) -> None:
+    plain = recorded(folder, RECORD)
+    assert "engine" not in plain.err
+    for engine in ("python", "numpy"):
+        forced = recorded(folder, RECORD, "--engine", engine)
+        assert forced.out == plain.out
+        assert forced.err.splitlines()[:2] == ["4 scans of 1 s, reverse acting", f"engine: {engine} (asked for)"]
+
+
+def test_the_choice_of_the_engine_is_told_with_its_reason(folder: Path) -> None:
+    err = recorded(folder, RECORD, "--engine", "auto").err
+    assert err.splitlines()[1] == "engine: python (too short to be worth a call into compiled code)"
+    found = strict_json(recorded(folder, RECORD, "--json").out)
+    assert found["engine"] == {"name": "python", "reason": "too short to be worth a call into compiled code"}

@@ -17,6 +17,8 @@ _COMMANDS: Final = {
     "convert": "Convert settings to another card, with a certificate.",
     "run": "Run a card on recorded signals.",
     "compare": "Run cards on the same signals and compare their outputs.",
+    "simulate": "Run a card in a closed loop with a process.",
+    "fleet": "Run a file of closed loops, on all cores or on a cluster.",
     "matrix": "Convert typical settings of every card to every card.",
     "code": "Print the scan program of a card with its settings.",
 }

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shutil
 import sys
 import textwrap
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
-from pidemu.errors import SettingError
+from pidemu.engines import ENGINES, Engine
+from pidemu.errors import RecordError, SettingError
+from pidemu.words import assignments as assignments  # noqa: PLC0414
+from pidemu.words import pair, seconds, step
 
 if TYPE_CHECKING:
     _PairType = click.ParamType[tuple[float, float]]
+    _TimeType = click.ParamType[float]
+    _StepType = click.ParamType[float | tuple[float, float]]
 else:
-    _PairType = click.ParamType  # it has no type parameter before click 8.4
+    _PairType = _TimeType = _StepType = click.ParamType  # it has no type parameter before click 8.4
 
 vendors_option = click.option(
     "--vendors",
@@ -41,10 +48,35 @@ class Pair(_PairType):
         if isinstance(value, tuple):
             return value
         try:
-            low, high = (float(x) for x in str(value).split(","))
-        except ValueError:
-            self.fail(f"'{value}' is not two numbers such as 0,200", param, ctx)
-        return low, high
+            return pair(str(value))
+        except SettingError as error:
+            self.fail(str(error), param, ctx)
+
+
+class Time(_TimeType):
+    """A time, in seconds or with a unit."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read the time [s]."""
+        try:
+            return seconds(str(value))
+        except SettingError as error:
+            self.fail(str(error), param, ctx)
+
+
+class Step(_StepType):
+    """The size of a step, or when it comes and its size."""
+
+    name = "SIZE|WHEN,SIZE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | tuple[float, float]:
+        """Read the step [s, %]."""
+        try:
+            return value if isinstance(value, float | tuple) else step(str(value))
+        except SettingError as error:
+            self.fail(str(error), param, ctx)
 
 
 class Scan(_PairType):
@@ -73,27 +105,31 @@ action_option = click.option(
     help="Reverse: the output falls when PV rises.",
 )
 limits_option = click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
+setpoint_option = click.option(
+    "--setpoint",
+    type=Step(),
+    help="Setpoint step [%], or when [s] and size; by default 10 after a twentieth of the time. 0 for none.",
+)
+load_option = click.option(
+    "--load",
+    type=Step(),
+    help="Load step at the process input [%], or when [s] and size; by default 10 after half the time. 0 for none.",
+)
+engine_option = click.option(
+    "--engine",
+    type=click.Choice(["auto", *ENGINES]),
+    help="What runs it, and say so; all give the same numbers. By default, and with auto, the quickest.",
+)
 
 
-def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, object]:
-    """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
+def asked_for(word: str | None) -> Engine | None:
+    """Return the engine that ``--engine`` forces; ``None`` leaves the choice."""
+    return next((e for e in ENGINES if e == word), None)
 
-    Raises
-    ------
-    SettingError
-        A word has no ``=``, or a name comes twice.
-    """
-    found: dict[str, object] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        name = name.strip()
-        if not equals or not name or not value.strip():
-            raise SettingError(f"'{word}' is not {what}; write for example {such}")
-        first = next((n for n in found if n.casefold() == name.casefold()), None)
-        if first is not None:
-            raise SettingError(f"{name} is given twice, {found[first]} and {value.strip()}; give it once")
-        found[name] = value.strip()
-    return found
+
+def given(**values: Any) -> dict[str, Any]:
+    """Return what is given, for a function that has defaults of its own."""
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def overridden(base: Mapping[str, object], top: Mapping[str, object]) -> dict[str, object]:
@@ -116,6 +152,22 @@ def heading(text: str) -> None:
 
 def _width(text: str) -> int:
     return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+@contextlib.contextmanager
+def opened(path: str) -> Iterator[TextIO]:
+    """Open a text file to write a result.
+
+    Raises
+    ------
+    RecordError
+        It cannot be written.
+    """
+    try:
+        with Path(path).open("w", encoding="utf-8", newline="") as stream:
+            yield stream
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 def table(

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
 from pidemu.card.library import load_card
-from pidemu.cli.common import action_option, assignments, json_option, limits_option, number, print_json, vendors_option
+from pidemu.cli.common import (
+    action_option,
+    asked_for,
+    assignments,
+    engine_option,
+    json_option,
+    limits_option,
+    number,
+    opened,
+    print_json,
+    vendors_option,
+)
 from pidemu.cli.happened import tell
 from pidemu.emulator import Controller
-from pidemu.errors import RecordError, SettingError, suggest
+from pidemu.errors import SettingError, suggest
 from pidemu.plain import json_safe
 from pidemu.record.files import Floats, Record, read_record, write_record
 from pidemu.record.playback import Playback, Timing, play, timing
@@ -55,6 +65,7 @@ from pidemu.scan.build import Action
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
+@engine_option
 @click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib.")
 @vendors_option
 @json_option
@@ -69,6 +80,7 @@ def command(
     initial_output: float | None,
     initial: tuple[str, ...],
     target: str | None,
+    engine: str | None,
     picture: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -88,7 +100,8 @@ def command(
     when = timing(record, file, scan, settings)
     start = _initial(record) if initial_output is None else initial_output
     kind: Action = "direct" if action == "direct" else "reverse"
-    controller = Controller(settings, when.scan, kind, limits, bias=bias, initial_output=start)
+    forced = asked_for(engine)
+    controller = Controller(settings, when.scan, kind, limits, bias=bias, initial_output=start, engine=forced)
     left = _start(controller, initial, initial_output is not None)
     playback = play(controller, record, file, when.interval)
     emulated = playback.outputs
@@ -101,6 +114,8 @@ def command(
         click.echo(f"note: {note}", err=True)
     uneven = "" if when.interval is None else ", as the intervals were recorded"
     click.echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
+    if engine is not None:
+        click.echo(f"engine: {controller.engine}", err=True)
     if not as_json:
         tell(playback)
     if record.output is not None:
@@ -153,6 +168,7 @@ def _plain(controller: Controller, record: Record, playback: Playback) -> dict[s
     plain = {
         **controller.settings.to_dict(),
         "scan": controller.interval,
+        "engine": {"name": controller.engine.engine, "reason": controller.engine.reason},
         "outputs": playback.outputs.tolist(),
         **playback.to_dict(),
         "difference": difference,
@@ -165,11 +181,8 @@ def _write(record: Record, emulated: Floats, target: str | None) -> None:
     if target is None:
         write_record(record, {"emulated": emulated}, sys.stdout)
         return
-    try:
-        with Path(target).open("w", encoding="utf-8", newline="") as stream:
-            write_record(record, {"emulated": emulated}, stream)
-    except OSError as error:
-        raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
+    with opened(target) as stream:
+        write_record(record, {"emulated": emulated}, stream)
 
 
 def _notes(

@@ -1,0 +1,176 @@
+"""``pidemu fleet``."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import click
+
+from pidemu.cli.common import (
+    Time,
+    asked_for,
+    engine_option,
+    given,
+    heading,
+    json_option,
+    load_option,
+    number,
+    opened,
+    print_json,
+    setpoint_option,
+    table,
+    vendors_option,
+)
+from pidemu.fleet.fleet import Fleet
+from pidemu.fleet.result import FleetResult
+from pidemu.fleet.table import LoopTable, read_loops
+from pidemu.plain import json_safe
+
+_ROWS: Final = 20
+"""Loops that are shown; a plant has thousands."""
+_RAN: Final = ("done", "ran away")
+_COLUMNS: Final = {
+    "IAE [% s]": "iae",
+    "largest error [%]": "peak",
+    "travel [%]": "travel",
+    "at low [s]": "at_low",
+    "at high [s]": "at_high",
+    "last error [%]": "error",
+}
+
+
+@click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
+@click.argument("file", metavar="LOOPS.csv")
+@click.option("--time", type=Time(), help="How long, for loops that do not say; by default as long as each takes to settle.")
+@setpoint_option
+@load_option
+@engine_option
+@click.option("--cores", type=click.IntRange(min=1), metavar="N", help="Threads on this machine; by default one per core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: its scheduler's address, such as tcp://HOST:8786.")
+@click.option("--table", "target", metavar="FILE.csv", help="Write the table: a row per loop.")
+@click.option("--signals", metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files.")
+@click.option("--parquet", metavar="FILE", help="Write table and signals as a Parquet file.")
+@click.option("--progress/--no-progress", default=None, help="A progress bar; by default for large fleets on a terminal.")
+@click.option("-v", "--verbose", is_flag=True, help="Say which engines ran, and how settings were read.")
+@vendors_option
+@json_option
+def command(
+    file: str,
+    time: float | None,
+    setpoint: float | tuple[float, float] | None,
+    load: float | tuple[float, float] | None,
+    engine: str | None,
+    cores: int | None,
+    scheduler: str | None,
+    target: str | None,
+    signals: str | None,
+    parquet: str | None,
+    progress: bool | None,
+    verbose: bool,
+    vendors: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run the closed loops of a CSV file, each with its own card, settings, scan interval and process.
+
+    Columns: tag, card, settings (GAIN=2; RESET=4; RATE=6 s), process (gain=1, lag=20, delay=3) and, where wanted, scan, action,
+    limits, setpoint, load, time. What a row says goes before --setpoint, --load and --time. A row that is wrong does not stop the
+    others: it is reported, and the exit status is 1.
+    """
+    if scheduler is not None and cores is not None:
+        raise click.UsageError("--cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out")
+    loops = read_loops(file, vendors)
+    for wrong in loops.wrong:
+        click.echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
+    if target is not None:
+        with opened(target):  # now, and not after the work
+            pass
+    result = None
+    if loops.loops:
+        result = Fleet(loops.loops).simulate(
+            time=time, folder=signals, parquet=parquet, engine=asked_for(engine), cores=cores, cluster=scheduler,
+            progress=progress, **given(setpoint=setpoint, load=load),
+        )  # fmt: skip
+    if target is not None:
+        loops.write(target, result)
+    rows = list(loops.rows(result))
+    if as_json:
+        print_json(_plain(loops, rows, result))
+    else:
+        _print(loops, rows, engines=verbose or engine is not None)
+    _say(loops, result, verbose)
+    if result is None or result.interrupted or any(row["status"] == "failed" for row in rows):
+        raise SystemExit(1)
+
+
+def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
+    """Say on stderr which loops could not be run, and whether all were; with `verbose`, how their settings were read."""
+    if result is None:
+        return
+    for loop, line, reason in zip(loops.loops, loops.lines, result.reasons, strict=True):
+        notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
+        for message in (*notes, *([reason] if reason else [])):
+            click.echo(loops.located(line, loop.tag, message), err=True)
+    if result.interrupted:
+        done = sum(result.counts[status] for status in _RAN)
+        click.echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
+
+
+def _plain(loops: LoopTable, rows: Sequence[Mapping[str, Any]], result: FleetResult | None) -> dict[str, Any]:
+    """Return everything as plain values."""
+    plain = {
+        "file": loops.path,
+        "counts": Counter(row["status"] for row in rows),
+        "engines": _engines(rows),
+        "interrupted": result is not None and result.interrupted,
+        "loops": rows,
+    }
+    safe: dict[str, Any] = json_safe(plain)
+    return safe
+
+
+def _engines(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """Return how many loops each engine ran."""
+    return dict(Counter(row["engine"] for row in rows if row["engine"]).most_common())
+
+
+def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool) -> None:
+    counts = Counter(row["status"] for row in rows)
+    said = ", ".join(f"{counts[status]:,} {status}" for status in (*_RAN, "failed", "not run") if counts[status])
+    heading(f"{loops.path}: {_loops(len(rows))}, {said}")
+    if engines:
+        used = ", ".join(f"{name} ({_loops(count)})" for name, count in _engines(rows).items())
+        click.echo(f"engine: {used or 'none, as nothing was run'}")
+    ran = [row for row in rows if row["status"] in _RAN]
+    if ran:
+        heading(f"\nThe {_ROWS} loops with the largest IAE" if len(ran) > _ROWS else "\nLoops, the largest IAE first")
+        worst = sorted(ran, key=_badness, reverse=True)[:_ROWS]
+        table(["tag", "card", "scan", *_COLUMNS, ""], [_cells(row) for row in worst], right=range(2, 3 + len(_COLUMNS)))
+    failed = [row for row in rows if row["status"] == "failed"]
+    if failed:
+        heading("\nFailed")
+        table(["", "", ""], [[f"line {row['line']}", row["tag"], row["card"]] for row in failed[:_ROWS]])
+    if len(failed) > _ROWS:
+        click.echo(f"  and {len(failed) - _ROWS:,} more; --table and --json list all")
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    """Return a row of the table for people; what ran away says so at its end."""
+    figures = (_figure(row[name]) for name in _COLUMNS.values())
+    return [row["tag"], row["card"], f"{number(row['scan'])} s", *figures, "ran away" if row["status"] == "ran away" else ""]
+
+
+def _loops(count: int) -> str:
+    return "1 loop" if count == 1 else f"{count:,} loops"
+
+
+def _badness(row: Mapping[str, Any]) -> float:
+    """Return the IAE; one that ran away is worse than any."""
+    iae = float(row["iae"])
+    return iae if math.isfinite(iae) and row["status"] == "done" else math.inf
+
+
+def _figure(x: float) -> str:
+    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))

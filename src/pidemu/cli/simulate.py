@@ -1,0 +1,196 @@
+"""``pidemu simulate``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import click
+
+from pidemu.card.library import load_card
+from pidemu.certificate.figures import other_units, unit_of
+from pidemu.certificate.models import LoopFigures
+from pidemu.cli.common import (
+    Pair,
+    Time,
+    asked_for,
+    assignments,
+    engine_option,
+    given,
+    heading,
+    json_option,
+    load_option,
+    number,
+    opened,
+    print_json,
+    setpoint_option,
+    table,
+    vendors_option,
+)
+from pidemu.engines import Choice, checked
+from pidemu.errors import ProcessError
+from pidemu.fleet.blocks import COLUMNS, figures_of
+from pidemu.loop.figures import loop_figures
+from pidemu.loop.process import parse_process
+from pidemu.loop.simulation import run_trial
+from pidemu.loop.trial import Step, Trial, trial
+from pidemu.plain import json_safe
+from pidemu.record.files import Record, write_record
+from pidemu.scan.build import Action
+
+_ACTIONS: Final[Mapping[str | None, Action | None]] = {None: None, "reverse": "reverse", "direct": "direct"}
+_NAMES: Final = {
+    "iae": "IAE",
+    "peak": "largest error",
+    "travel": "travel of the output",
+    "at_low": "at the low limit",
+    "at_high": "at the high limit",
+    "error": "last error",
+}
+_MARGINS: Final = {
+    "gain margin": "gain_margin",
+    "phase margin [deg]": "phase_margin",
+    "delay margin [s]": "delay_margin",
+    "crossover [rad/s]": "crossover",
+    "Ms": "Ms",
+    "Mt": "Mt",
+}
+
+
+@click.command("simulate", short_help="Run a card in a closed loop with a process.")
+@click.argument("card")
+@click.argument("values", nargs=-1, metavar="NAME=VALUE...")
+@click.option(
+    "--process",
+    "model",
+    required=True,
+    metavar="gain=...,lag=...,delay=...",
+    help="The process, from output to measurement (times in s, or with a unit).",
+)
+@click.option(
+    "--scan",
+    type=Time(),
+    help="Scan interval [s]; by default the card's, or a twentieth of the time in which the loop moves where that is shorter.",
+)
+@setpoint_option
+@load_option
+@click.option("--time", type=Time(), help="How long; by default long enough for both responses to settle.")
+@click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
+@click.option("--limits", type=Pair(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
+@engine_option
+@click.option("-o", "--out", "target", metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan.")
+@vendors_option
+@json_option
+def command(
+    card: str,
+    values: tuple[str, ...],
+    model: str,
+    scan: float | None,
+    setpoint: float | tuple[float, float] | None,
+    load: float | tuple[float, float] | None,
+    time: float | None,
+    action: str | None,
+    limits: tuple[float, float] | None,
+    engine: str | None,
+    target: str | None,
+    vendors: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run CARD with the settings NAME=VALUE in a closed loop with a process, from rest at 50 %, and print its figures.
+
+    Errors count from the load step on, or from the start where there is none. The margins are those of the sampled loop within
+    its limits.
+    """
+    settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
+    forced, kind = checked(asked_for(engine)), _ACTIONS[action]
+    made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
+    pv, out, choice = run_trial(made, forced)
+    if target is not None:
+        columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
+        with opened(target) as stream:
+            write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
+    figures = figures_of(made, pv, out)
+    margins = loop_figures(settings.law(made.scan), process) if _is_negative(made, kind) else None
+    if as_json:
+        print_json(_plain(made, choice, figures, margins))
+    else:
+        _print(made, choice if engine else None, figures, margins)
+    for note in (*settings.notes, *_notes(made, kind, margins)):
+        click.echo(f"note: {note}", err=True)
+
+
+def _is_negative(made: Trial, action: Action | None) -> bool:
+    """Tell whether the feedback is negative; what is not given is chosen so that it is."""
+    if action is None:
+        return True
+    try:
+        chosen = trial(made.settings, made.process, made.scan, time=made.scans * made.scan, output_limits=made.limits)
+    except ProcessError:  # no choice of action, and the wrong sign
+        return False
+    return chosen.action == made.action or made.settings.equation.action.fixed
+
+
+def _notes(made: Trial, action: Action | None, margins: LoopFigures | None) -> Iterator[str]:
+    """Yield what should be known beside the figures."""
+    if action == "direct" and made.settings.equation.action.fixed:
+        yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
+    if margins is None:
+        yield "the feedback is positive, so that the loop has no margins; leave --action out, or give the gain the other sign"
+    for what in made.settings.algorithm().too_coarse(made.scan):
+        yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
+
+
+def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: LoopFigures | None) -> dict[str, Any]:
+    """Return everything as plain values, but for the signals."""
+    plain = {
+        **made.settings.to_dict(),
+        "process": made.process.text,
+        "scan": made.scan,
+        "scans": made.scans,
+        "action": made.action,
+        "limits": made.limits,
+        "setpoint": made.setpoint_step,
+        "load": made.load_step,
+        "engine": {"name": choice.engine, "reason": choice.reason},
+        "figures": dict(figures),
+        "margins": None if margins is None else {name: getattr(margins, name) for name in ("stable", *_MARGINS.values())},
+    }
+    safe: dict[str, Any] = json_safe(plain)
+    return safe
+
+
+def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], margins: LoopFigures | None) -> None:
+    s, low, high = made.settings, *made.limits
+    heading(s.card.title + (f"  [{s.variant.choice_text}]" if s.options else ""))
+    rows = [
+        [name, number(v.value), unit_of(v), other_units(v), "" if v.given else "card's default"]
+        for name, v in s.items()
+        if v.active
+    ]
+    table([""] * 5, rows, right=(1,))
+    heading("\nThe loop")
+    rows = [
+        ["process", made.process.text],
+        ["scan", f"{number(made.scan)} s, {made.scans:,} scans"],
+        ["action", made.action],
+        ["output limits", f"{number(low)} to {number(high)} %"],
+        ["setpoint step", _step(made.setpoint_step)],
+        ["load step", _step(made.load_step)],
+        *([] if choice is None else [["engine", str(choice)]]),
+    ]
+    table(["", ""], rows)
+    heading(f"\nWhat it did, errors from the {'start' if made.load_step is None else 'load step'} on")
+    table(["", "", ""], [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()], right=(1,))
+    if margins is not None:
+        heading("\nMargins, sampled and within the limits")
+        rows = [[name, _short(getattr(margins, attribute))] for name, attribute in _MARGINS.items()]
+        table(["", ""], [*rows, ["stable", "yes" if margins.stable else "NO"]], right=(1,))
+
+
+def _step(step: Step | None) -> str:
+    return "none" if step is None else f"{number(step[1])} % at {number(step[0])} s"
+
+
+def _short(x: float) -> str:
+    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))

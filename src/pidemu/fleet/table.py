@@ -1,0 +1,240 @@
+"""A fleet as a CSV file: a row per loop, and what came of each."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pidemu.card.library import folders, load_card
+from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
+from pidemu.fleet.loops import Loop
+from pidemu.fleet.result import HEADER, FleetResult
+from pidemu.loop.process import parse_process
+from pidemu.scan.build import Action
+from pidemu.words import assignments, pair, seconds, step
+
+COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
+"""Columns of a file of loops."""
+_REQUIRED: Final = COLUMNS[:4]
+_ACTIONS: Final[Mapping[str, Action]] = {"reverse": "reverse", "direct": "direct"}
+
+
+@dataclass(frozen=True)
+class WrongRow:
+    """A row that makes no loop.
+
+    Attributes
+    ----------
+    line : int
+        Its line in the file, counted from 1.
+    tag, card : str
+        What stands in these columns.
+    reason : str
+        Cause and remedy.
+    """
+
+    line: int
+    tag: str
+    card: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class LoopTable:
+    """What a file of loops holds.
+
+    Attributes
+    ----------
+    path : str
+        The file.
+    loops : tuple of Loop
+        The loops, in the order of the file.
+    lines : tuple of int
+        The line of each loop in the file, counted from 1.
+    wrong : tuple of WrongRow
+        The rows that make no loop, and why.
+    """
+
+    path: str
+    loops: tuple[Loop, ...]
+    lines: tuple[int, ...]
+    wrong: tuple[WrongRow, ...]
+
+    def __len__(self) -> int:
+        return len(self.lines) + len(self.wrong)
+
+    def located(self, line: int, tag: str, reason: str) -> str:
+        """Return a message with the place it is about: ``loops.csv:7: FIC-101: reason``."""
+        return ": ".join(part for part in (f"{self.path}:{line}", tag, reason) if part)
+
+    def rows(self, result: FleetResult | None) -> Iterator[dict[str, Any]]:
+        """Yield a row per row of the file, with its line and the names of a result's table; what is not known is ``None``.
+
+        Parameters
+        ----------
+        result : FleetResult or None
+            What came of `loops`; ``None`` where there are none.
+        """
+        ran = [] if result is None else [{"line": line, **row} for line, row in zip(self.lines, result.rows(), strict=True)]
+        empty = dict.fromkeys(HEADER)
+        failed = [
+            {"line": w.line, **empty, "tag": w.tag, "card": w.card, "status": "failed", "reason": w.reason} for w in self.wrong
+        ]
+        yield from sorted([*ran, *failed], key=lambda row: int(str(row["line"])))
+
+    def write(self, path: str | Path, result: FleetResult | None) -> None:
+        """Write the table of a result as CSV, with the rows that make no loop among the others.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        result : FleetResult or None
+            What came of `loops`; ``None`` where there are none.
+
+        Raises
+        ------
+        FleetError
+            The file cannot be written.
+        """
+        try:
+            with Path(path).open("w", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, HEADER, extrasaction="ignore")
+                writer.writeheader()
+                writer.writerows(self.rows(result))
+        except OSError as error:
+            raise FleetError(f"{path}: cannot be written: {error.strerror}; give a file that can") from None
+
+
+def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
+    """Read a CSV file of loops: a header line, a row per loop; lines that start with ``#`` are comments.
+
+    The cells are separated by commas, or by semicolons where the header line has these. Columns, in any order: ``tag``, ``card``,
+    ``settings`` (``GAIN=2; RESET=4; RATE=6 s``: dials in the card's units or with one, and options, by the card's names),
+    ``process`` (``gain=1, lag=20, delay=3``, see `pidemu.loop.process.parse_process`), and, where they are there, ``scan`` [s],
+    ``action`` (reverse, direct), ``limits`` of the output [%] (``0,100``), ``setpoint`` and ``load`` (size of a step [%], or when
+    [s] and size: ``60,5``) and ``time`` [s]. What an empty cell does not say, the fleet decides.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    vendors : sequence of path, optional
+        Folders of the user's own cards, searched before the built-in ones.
+
+    Returns
+    -------
+    LoopTable
+        The loops, and the rows that make none: a wrong row does not stop the others.
+
+    Raises
+    ------
+    FleetError
+        The file cannot be read, lacks a column or has an unknown one, or holds no row.
+    CardNotFoundError
+        There is no such folder of cards.
+    """
+    folders(vendors)  # one that is not there is no fault of a row
+    (head, names), *rows = _lines(path)
+    delimiter = ";" if names.count(";") > names.count(",") else ","
+    try:
+        header = _header(_cells(names, delimiter))
+    except FleetError as error:
+        raise FleetError(f"{path}:{head}: {error}") from None
+    loops: list[Loop] = []
+    lines: list[int] = []
+    wrong: list[WrongRow] = []
+    seen: dict[str, int] = {}
+    for number, line in rows:
+        row: Mapping[str, str] = {}
+        try:
+            cells = _cells(line, delimiter)
+            row = {name: cell for name, cell in zip(header, cells, strict=False) if cell}
+            if len(cells) != len(header):
+                raise FleetError(
+                    f"{len(cells)} cells, the header has {len(header)}; put a cell that holds '{delimiter}' in quotation marks"
+                )
+            loops.append(_loop(row, number, seen, vendors))
+            lines.append(number)
+        except PidemuError as error:
+            wrong.append(WrongRow(number, row.get("tag", ""), row.get("card", ""), _in_one_line(error)))
+    return LoopTable(str(path), tuple(loops), tuple(lines), tuple(wrong))
+
+
+def _lines(path: str | Path) -> list[tuple[int, str]]:
+    """Return the lines that say something, with their numbers."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise FleetError(f"{path}: not UTF-8 text; save the file as UTF-8") from None
+    except OSError as error:
+        raise FleetError(f"{path}: cannot be read: {error.strerror}") from None
+    lines = [(i, line) for i, line in enumerate(text.split("\n"), 1) if line.strip(" \t\r,;") and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise FleetError(f"{path}: no loops; the file has a header line such as {','.join(_REQUIRED)} and one line per loop")
+    return lines
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    if line.count('"') % 2:
+        raise FleetError("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled")
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    except csv.Error as error:
+        raise FleetError(f"no row of a CSV file ({error}); save the table as CSV text") from None
+
+
+def _header(cells: Sequence[str]) -> list[str]:
+    """Return the names of the columns."""
+    names = [cell.casefold() for cell in cells]
+    unknown = [cell for cell, name in zip(cells, names, strict=True) if name not in COLUMNS]
+    if unknown:
+        which = ", ".join(f"'{cell}'{suggest(cell, COLUMNS)}" for cell in unknown)
+        raise FleetError(f"unknown column{'s' if len(unknown) > 1 else ''} {which}; columns: {', '.join(COLUMNS)}")
+    missing = [name for name in _REQUIRED if name not in names]
+    if missing:
+        raise FleetError(f"no column '{missing[0]}'; {', '.join(_REQUIRED)} are needed")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise FleetError(f"the column '{twice[0]}' comes twice; keep one")
+    return names
+
+
+def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequence[str | Path]) -> Loop:
+    """Return the loop of a row; `seen` has the line of every tag."""
+    for name in ("tag", "card", "process"):
+        if name not in row:
+            raise FleetError(f"no {name}; every loop needs one")
+    first = seen.setdefault(row["tag"], line)
+    if first != line:
+        raise FleetError(f"line {first} has this tag already; give each loop its own")
+    given = assignments(word for word in row.get("settings", "").split(";") if word.strip())
+    readers = {"scan": seconds, "time": seconds, "setpoint": step, "load": step, "limits": pair, "action": _action}
+    found: dict[str, Any] = {}
+    for name, read in readers.items():
+        if name in row:
+            try:
+                found["output_limits" if name == "limits" else name] = read(row[name])
+            except SettingError as error:
+                raise SettingError(f"{name}: {error}") from None
+    settings = load_card(row["card"], vendors).settings(given)
+    return Loop(row["tag"], settings, parse_process(row["process"]), **found)
+
+
+def _action(text: str) -> Action:
+    action = _ACTIONS.get(text.casefold())
+    if action is None:
+        raise SettingError(
+            f"'{text}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
+        )
+    return action
+
+
+def _in_one_line(error: PidemuError) -> str:
+    """Return the message of an error, as a row of a table can hold it."""
+    if isinstance(error, CardError) and error.problems:
+        return "; ".join(problem.headline() for problem in error.problems)
+    return "; ".join(str(error).splitlines())

@@ -1,0 +1,78 @@
+"""What people write on a command line or in a cell of a table: assignments, pairs of numbers, times, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from pidemu.errors import SettingError, UnitError
+from pidemu.settings import RESERVED
+from pidemu.units import Role, parse_quantity, to_canonical
+
+
+def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, Any]:
+    """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
+
+    A signal range, such as ``pv_range=0,200``, is a pair of numbers; every other value stays a text.
+
+    Raises
+    ------
+    SettingError
+        A word has no ``=``, a name comes twice, or a signal range is no pair.
+    """
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        name = name.strip()
+        if not equals or not name or not value.strip():
+            raise SettingError(f"'{word}' is not {what}; write for example {such}")
+        first = next((n for n in found if n.casefold() == name.casefold()), None)
+        if first is not None:
+            raise SettingError(f"{name} is given twice, {found[first]} and {value.strip()}; give it once")
+        found[name] = value.strip()
+    return {name: pair(value) if name in RESERVED else value for name, value in found.items()}
+
+
+def pair(text: str) -> tuple[float, float]:
+    """Read two numbers with a comma between, such as ``0,200``.
+
+    Raises
+    ------
+    SettingError
+        They are not two numbers.
+    """
+    try:
+        low, high = (float(x) for x in text.split(","))
+    except ValueError:
+        raise SettingError(f"'{text}' is not two numbers such as 0,200") from None
+    return low, high
+
+
+def seconds(text: str) -> float:
+    """Read a time: seconds, or a number with a unit such as ``10 min`` [s].
+
+    Raises
+    ------
+    SettingError
+        It is no time.
+    """
+    try:
+        number, unit = parse_quantity(text.strip())
+        return number if unit is None else to_canonical(Role.PROCESS_TIME, number, unit)
+    except UnitError:
+        raise SettingError(f"'{text}' is no time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
+
+
+def step(text: str) -> float | tuple[float, float]:
+    """Read a step: its size [%], or when [s] and its size with a comma between.
+
+    Raises
+    ------
+    SettingError
+        It is neither.
+    """
+    when, comma, size = text.rpartition(",")
+    try:
+        return (seconds(when), float(size)) if comma else float(text)
+    except (ValueError, SettingError):
+        raise SettingError(f"'{text}' is no step; write its size in %, such as 5, or when and its size, such as 60,5") from None

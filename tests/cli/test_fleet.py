@@ -1,0 +1,239 @@
+"""The command that runs a file of loops."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pidemu
+from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.prepare import Failed
+from pidemu.fleet.result import FleetResult
+from tests.cli.helpers import said, strict_json, told
+
+HEAD = "tag,card,settings,process,scan,time\n"
+FAST = 'FIC-1,generic/standard,K=2; Ti=10,"gain=1,lag=10,delay=2",0.5,100\n'
+SLOW = 'TIC-2,fisher/provox,GAIN=1; RESET=2,"gain=1,lag=40,delay=5",1,\n'
+WRONG = "LIC-3,fisher/provox,GIAN=1; RESET=2,gain=1,,\n"
+UNFIT = 'PIC-4,generic/standard,K=2; Ti=10,"gain=1,lag=10",-1,\n'
+RUNAWAY = 'XIC-5,generic/standard,K=0.1; Ti=10,"gain=1,pole=2",0.5,400\n'
+WHY = "fisher/provox: unknown setting 'GIAN' (did you mean 'GAIN'?); settings: GAIN, RESET, RATE"
+
+
+@pytest.fixture(autouse=True)
+def _loops(folder: Path) -> None:
+    (folder / "good.csv").write_text(HEAD + FAST + SLOW, encoding="utf-8")
+    (folder / "loops.csv").write_text(HEAD + FAST + WRONG + SLOW + UNFIT, encoding="utf-8")
+    (folder / "many.csv").write_text(HEAD + "".join(FAST.replace("FIC-1", f"FIC-{i}") for i in range(1, 31)), encoding="utf-8")
+
+
+def rows(path: str) -> dict[str, dict[str, str]]:
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        return {row["tag"]: row for row in csv.DictReader(file)}
+
+
+def simulated() -> pidemu.Simulation:
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=1, RESET=2)
+    return pidemu.simulate(settings, pidemu.Process.from_lags(1.0, lags=[40], delay=5), 1.0)
+
+
+def chosen() -> str:
+    """The engine that is chosen for the loops of good.csv."""
+    (engine,) = set(pidemu.Fleet(pidemu.read_loops("good.csv").loops).simulate().engines)
+    return engine
+
+
+def test_the_loops_are_run_and_shown_the_largest_iae_first() -> None:
+    out = told("fleet", "good.csv")
+    lines = out.splitlines()
+    assert lines[0] == "good.csv: 2 loops, 2 done"
+    assert lines[2] == "Loops, the largest IAE first"
+    assert [line.split()[:4] for line in lines[4:]] == [
+        ["TIC-2", "fisher/provox", "1", "s"],
+        ["FIC-1", "generic/standard", "0.5", "s"],
+    ]
+    assert float(lines[4].split()[4]) == pytest.approx(simulated().iae, rel=5e-4)  # four digits are shown
+    assert "engine" not in out
+
+
+def test_a_wrong_row_and_a_loop_that_cannot_be_run_are_said_at_their_lines_and_do_not_stop_the_others() -> None:
+    status, out, err = said("fleet", "loops.csv", "--table", "out.csv")
+    assert status == 1
+    unfit = "the scan interval -1 s is not a positive number; give the time between two scans"
+    assert err.splitlines() == [f"loops.csv:3: LIC-3: {WHY}", f"loops.csv:5: PIC-4: {unfit}"]
+    assert out.splitlines()[0] == "loops.csv: 4 loops, 2 done, 2 failed"
+    assert out.splitlines()[-3:] == ["Failed", "  line 3  LIC-3  fisher/provox", "  line 5  PIC-4  generic/standard"]
+    found = rows("out.csv")
+    assert {tag: row["status"] for tag, row in found.items()} == {
+        "FIC-1": "done", "LIC-3": "failed", "TIC-2": "done", "PIC-4": "failed",
+    }  # fmt: skip
+    assert (found["LIC-3"]["reason"], found["PIC-4"]["reason"]) == (WHY, unfit)
+    assert float(found["TIC-2"]["error"]) == simulated().error[-1]
+
+
+def test_a_file_of_which_no_row_makes_a_loop_fails(folder: Path) -> None:
+    (folder / "bad.csv").write_text(HEAD + WRONG, encoding="utf-8")
+    status, out, err = said("fleet", "bad.csv", "-v")
+    assert (status, err) == (1, f"bad.csv:2: LIC-3: {WHY}\n")
+    assert out.splitlines()[:2] == ["bad.csv: 1 loop, 1 failed", "engine: none, as nothing was run"]
+
+
+def test_a_loop_that_runs_away_is_a_result_and_stands_first(folder: Path) -> None:
+    (folder / "away.csv").write_text(HEAD + FAST + RUNAWAY, encoding="utf-8")
+    out = told("fleet", "away.csv")
+    assert out.splitlines()[0] == "away.csv: 2 loops, 1 done, 1 ran away"
+    first = out.splitlines()[4].split()
+    assert (first[0], first[-2:]) == ("XIC-5", ["ran", "away"])
+
+
+def test_twenty_loops_of_a_plant_are_shown() -> None:
+    lines = told("fleet", "many.csv").splitlines()
+    assert lines[0] == "many.csv: 30 loops, 30 done"
+    assert lines[2] == "The 20 loops with the largest IAE"
+    assert len(lines) == 4 + 20
+
+
+def test_twenty_failures_are_shown_and_all_are_said(folder: Path) -> None:
+    (folder / "bad.csv").write_text(HEAD + "".join(WRONG.replace("LIC-3", f"LIC-{i}") for i in range(25)), encoding="utf-8")
+    _, out, err = said("fleet", "bad.csv")
+    assert len(err.splitlines()) == 25
+    assert out.splitlines()[-1] == "  and 5 more; --table and --json list all"
+    assert sum(line.startswith("  line ") for line in out.splitlines()) == 20
+
+
+def test_steps_and_time_count_for_loops_that_do_not_say(folder: Path) -> None:
+    (folder / "own.csv").write_text(
+        "tag,card,settings,process,scan,setpoint,load,time\n"
+        'A,fisher/provox,GAIN=1; RESET=2,"gain=1,lag=40,delay=5",1,0,"5,3",200\n'
+        'B,fisher/provox,GAIN=1; RESET=2,"gain=1,lag=40,delay=5",1,,,\n',
+        encoding="utf-8",
+    )
+    told("fleet", "own.csv", "--setpoint", "0", "--load", "20,-4", "--time", "5 min", "--table", "out.csv")
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=1, RESET=2)
+    process = pidemu.Process.from_lags(1.0, lags=[40], delay=5)
+    own = pidemu.simulate(settings, process, 1.0, setpoint=0, load=(5, 3), time=200)
+    fleet = pidemu.simulate(settings, process, 1.0, setpoint=0, load=(20, -4), time=300)
+    found = rows("out.csv")
+    for tag, ran in (("A", own), ("B", fleet)):
+        assert (int(found[tag]["scans"]), float(found[tag]["error"])) == (ran.times.size, ran.error[-1])
+
+
+@pytest.mark.parametrize("engine", ["python", "numpy"])
+def test_an_engine_that_is_asked_for_runs_and_is_named_and_the_numbers_are_the_same(engine: str) -> None:
+    told("fleet", "good.csv", "--table", "auto.csv")
+    out = told("fleet", "good.csv", "--engine", engine, "--table", "forced.csv")
+    assert out.splitlines()[1] == f"engine: {engine} (2 loops)"
+    auto, forced = rows("auto.csv"), rows("forced.csv")
+    for tag, row in forced.items():
+        assert row["engine"] == engine
+        assert {**row, "engine": ""} == {**auto[tag], "engine": ""}
+
+
+@pytest.mark.parametrize("word", ["-v", "--verbose", "--engine=auto"])
+def test_the_engine_that_was_chosen_is_named_on_request(word: str) -> None:
+    assert told("fleet", "good.csv", word).splitlines()[1] == f"engine: {chosen()} (2 loops)"
+
+
+def test_verbose_says_how_settings_were_read(folder: Path) -> None:
+    (folder / "unit.csv").write_text(HEAD + FAST.replace("Ti=10", "Ti=0.5 min"), encoding="utf-8")
+    assert said("fleet", "unit.csv").err == ""
+    assert said("fleet", "unit.csv", "-v").err == "unit.csv:2: FIC-1: note: Ti: 0.5 min is 30 s\n"
+
+
+def test_signals_and_parquet_hold_what_a_simulation_gives(folder: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    told("fleet", "good.csv", "--signals", "kept", "--parquet", "kept.parquet", "--cores", "1")
+    place = rows("kept/signals.csv")["TIC-2"]
+    block = np.load(folder / "kept" / place["file"])
+    ran = simulated()
+    assert block[0, :, int(place["loop"])].tolist() == ran.output.tolist()
+    table = {row["tag"]: row for row in pq.read_table(folder / "kept.parquet").to_pylist()}
+    assert table["TIC-2"]["measurement"] == ran.measurement.tolist()
+
+
+def test_json_holds_every_loop_with_its_line() -> None:
+    status, out, err = said("fleet", "loops.csv", "--json")
+    found = strict_json(out)
+    assert status == 1
+    assert len(err.splitlines()) == 2
+    assert (found["file"], found["counts"], found["engines"]) == ("loops.csv", {"done": 2, "failed": 2}, {chosen(): 2})
+    assert found["interrupted"] is False
+    assert [(row["tag"], row["line"], row["status"]) for row in found["loops"]] == [
+        ("FIC-1", 2, "done"), ("LIC-3", 3, "failed"), ("TIC-2", 4, "done"), ("PIC-4", 5, "failed"),
+    ]  # fmt: skip
+    assert found["loops"][1]["reason"] == WHY
+    assert found["loops"][2]["error"] == simulated().error[-1]
+
+
+def test_progress_is_shown_on_request() -> None:
+    assert "2/2" in said("fleet", "good.csv", "--progress").err
+    assert said("fleet", "good.csv", "--no-progress").err == ""
+
+
+def test_an_interrupted_fleet_gives_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    add = FleetResult.add
+
+    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+        if "done" in self.status:
+            raise KeyboardInterrupt
+        return add(self, found)
+
+    monkeypatch.setattr(FleetResult, "add", interrupted)
+    status, out, err = said("fleet", "loops.csv", "--cores", "1", "--table", "out.csv")
+    assert status == 1
+    assert err.splitlines()[-1] == "interrupted: 1 of 4 loops are done"
+    assert out.splitlines()[0].startswith("loops.csv: 4 loops, 1 done, ")
+    assert "not run" in {row["status"] for row in rows("out.csv").values()}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are another matter there")
+def test_ctrl_c_ends_the_run_and_prints_and_writes_what_is_done(folder: Path) -> None:
+    loops = "".join(SLOW.replace("TIC-2", f"TIC-{i}").replace(",1,\n", ",1,2e4\n") for i in range(300))
+    (folder / "long.csv").write_text(HEAD + FAST + loops, encoding="utf-8")
+    words = ["fleet", "long.csv", "--engine", "python", "--cores", "1", "--signals", "kept", "--table", "out.csv"]
+    process = subprocess.Popen([sys.executable, "-m", "pidemu", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (folder / "kept" / "block-00003.npy").exists():  # two blocks are done then
+        time.sleep(0.02)
+        assert process.poll() is None, process.communicate()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    done = [tag for tag, row in rows("out.csv").items() if row["status"] == "done"]
+    assert 0 < len(done) < 301
+    assert (process.returncode, err) == (1, f"interrupted: {len(done)} of 301 loops are done\n")
+    assert out.splitlines()[0] == f"long.csv: 301 loops, {len(done)} done, {301 - len(done)} not run"
+
+
+REFUSED = {
+    "fleet none.csv": "none.csv: cannot be read: No such file or directory",
+    "fleet good.csv --table nowhere/out.csv": "nowhere/out.csv: cannot be written: No such file or directory",
+    "fleet good.csv --vendors nowhere": "no folder 'nowhere'; a folder of cards holds <vendor>/<block>.yaml",
+    "fleet wrong.csv": (
+        "wrong.csv:1: unknown column 'tga' (did you mean 'tag'?); columns: tag, card, settings, process, scan, action, limits, "
+        "setpoint, load, time"
+    ),
+}
+
+
+@pytest.mark.parametrize(("line", "message"), REFUSED.items())
+def test_what_cannot_be_done_is_said_with_status_2(line: str, message: str, folder: Path) -> None:
+    (folder / "wrong.csv").write_text("tga,card,settings,process\nA,b,c,d\n", encoding="utf-8")
+    assert said(*line.split()) == (2, "", f"error: {message}\n")
+
+
+def test_a_folder_that_holds_signals_already_is_refused() -> None:
+    told("fleet", "good.csv", "--signals", "kept")
+    status, _, err = said("fleet", "good.csv", "--signals", "kept")
+    assert (status, err) == (2, "error: kept holds the signals of a fleet already; give another folder, or empty it\n")
+
+
+def test_cores_and_a_scheduler_are_one_too_many() -> None:
+    status, out, err = said("fleet", "good.csv", "--cores", "2", "--scheduler", "tcp://127.0.0.1:8786")
+    assert (status, out) == (2, "")
+    assert err.endswith("Error: --cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out\n")

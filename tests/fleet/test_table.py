@@ -1,0 +1,200 @@
+"""A fleet as a CSV file: what its cells mean, and rows that make no loop."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+import pidemu
+from pidemu.errors import CardNotFoundError, FleetError
+from pidemu.fleet.result import HEADER
+from pidemu.fleet.table import LoopTable, read_loops
+from tests.checks.bench import VALID, edited, written
+
+HEAD = "tag,card,settings,process,scan,action,limits,setpoint,load,time"
+GOOD = 'FIC-1,generic/standard,K=2; Ti=10,"gain=1,lag=10,delay=2",0.5,,,0,"10,5",100'
+PROCESS = pidemu.Process.from_lags(1.0, lags=[10], delay=2)
+
+
+def read(folder: Path, *rows: str, head: str = HEAD) -> LoopTable:
+    (folder / "loops.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return read_loops(folder / "loops.csv")
+
+
+def reason(folder: Path, row: str, head: str = HEAD) -> str:
+    """Why a row makes no loop, after one that does."""
+    table = read(folder, GOOD if head == HEAD else "", row, head=head)
+    (wrong,) = table.wrong
+    return wrong.reason
+
+
+def test_every_cell_says_what_the_attribute_of_a_loop_says(tmp_path: Path) -> None:
+    row = 'T-2,emerson/deltav,GAIN=2; RESET=0.5 min/repeat; structure=2;,"gain=-1, lag=1 min",500 ms,Direct,"5,95",8,"1 min,-3",2 h'
+    (loop,) = read(tmp_path, row).loops
+    assert loop == pidemu.Loop(
+        "T-2",
+        pidemu.load_card("emerson/deltav").settings(GAIN="2", RESET="0.5 min/repeat", STRUCTURE="2"),
+        pidemu.Process.from_lags(-1.0, lags=[60]),
+        scan=0.5,
+        setpoint=8.0,
+        load=(60.0, -3.0),
+        time=7200.0,
+        action="direct",
+        output_limits=(5.0, 95.0),
+    )
+    assert loop.settings["RESET"].to("s/repeat") == 30
+
+
+def test_what_an_empty_cell_or_a_missing_column_does_not_say_is_left_to_the_fleet(tmp_path: Path) -> None:
+    settings = pidemu.load_card("generic/standard").settings(K="2", Ti="10")
+    bare = pidemu.Loop("A", settings, pidemu.Process(1.0))
+    assert read(tmp_path, "A,generic/standard,K=2; Ti=10,gain=1,,,,,,").loops == (bare,)
+    assert read(tmp_path, "A,generic/standard,K=2; Ti=10,gain=1", head="tag,card,settings,process").loops == (bare,)
+
+
+def test_semicolons_may_separate_the_cells(tmp_path: Path) -> None:
+    semicolons = 'FIC-1;generic/standard;"K=2; Ti=10";gain=1,lag=10,delay=2;0.5;;;0;10,5;100'
+    assert read(tmp_path, GOOD).loops == read(tmp_path, semicolons, head=HEAD.replace(",", ";")).loops
+
+
+def test_columns_stand_in_any_order_and_case_with_blanks_around(tmp_path: Path) -> None:
+    turned = "Process , SETTINGS,card, Tag"
+    (loop,) = read(tmp_path, '"gain=1,lag=10,delay=2" , K=2 ;Ti=10 , generic/standard , FIC-1 ', head=turned).loops
+    assert (loop.tag, loop.process, loop.settings["Ti"].value) == ("FIC-1", PROCESS, 10.0)
+
+
+def test_signal_ranges_stand_among_the_settings(tmp_path: Path) -> None:
+    (loop,) = read(tmp_path, 'A,bailey/fc19,"KP=2; pv_range=0,200",gain=1,,,,,,').loops
+    assert loop.settings.pv_range == (0, 200)
+
+
+def test_lines_are_counted_as_an_editor_counts_them(tmp_path: Path) -> None:
+    text = "\ufeff# a plant\r\n\r\n" + HEAD + "\r\n" + GOOD + "\r\n,,,,,,,,,\r\n# out of service\r\nLIC-2,no/card,,gain=1,,,,,,\r\n"
+    (tmp_path / "loops.csv").write_bytes(text.encode())
+    table = read_loops(tmp_path / "loops.csv")
+    assert table.lines == (4,)
+    assert [(w.line, w.tag, w.card) for w in table.wrong] == [(7, "LIC-2", "no/card")]
+
+
+WRONG = {
+    ",generic/standard,K=2; Ti=10,gain=1,,,,,,": "no tag; every loop needs one",
+    "A,,K=2; Ti=10,gain=1,,,,,,": "no card; every loop needs one",
+    "A,generic/standard,K=2; Ti=10,,,,,,,": "no process; every loop needs one",
+    "FIC-1,generic/standard,K=2; Ti=10,gain=1,,,,,,": "line 2 has this tag already; give each loop its own",
+    "A,generic/standrd,K=2; Ti=10,gain=1,,,,,,": (
+        "no card 'generic/standrd' (did you mean 'generic/standard'?); 'pidemu cards' lists them"
+    ),
+    "A,generic/standard,K=2; Ti=10; T=3,gain=1,,,,,,": (
+        "generic/standard: unknown setting 'T' (did you mean 'Ti'?); settings: K, Ti, Td, Tf, b, c"
+    ),
+    "A,fisher/provox,,gain=1,,,,,,": (
+        "fisher/provox: GAIN: missing; it sets the gain (% output per % PV), in %/%; "
+        "fisher/provox: RESET: missing; it sets the integral (reset rate), in repeat/min"
+    ),
+    "A,generic/standard,K=2; K=3,gain=1,,,,,,": "K is given twice, 2 and 3; give it once",
+    "A,generic/standard,K 2,gain=1,,,,,,": "'K 2' is not NAME=VALUE; write for example GAIN=2 or \"RESET=20 s/repeat\"",
+    "A,bailey/fc19,pv_range=5,gain=1,,,,,,": "'5' is not two numbers such as 0,200",
+    "A,generic/standard,K=2; Ti=10,lag=3,,,,,,": "'lag=3' has no gain; add gain=1.5, for example",
+    "A,generic/standard,K=2; Ti=10,gain=1,fast,,,,,": (
+        "scan: 'fast' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+    ),
+    'A,generic/standard,K=2; Ti=10,gain=1,"0,5",,,,,': (
+        "scan: '0,5' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+    ),
+    "A,generic/standard,K=2; Ti=10,gain=1,,revers,,,,": (
+        "action: 'revers' is neither reverse nor direct (did you mean 'reverse'?); leave the cell empty for negative feedback"
+    ),
+    "A,generic/standard,K=2; Ti=10,gain=1,,,100,,,": "limits: '100' is not two numbers such as 0,200",
+    'A,generic/standard,K=2; Ti=10,gain=1,,,,"1,2,3",,': (
+        "setpoint: '1,2,3' is no step; write its size in %, such as 5, or when and its size, such as 60,5"
+    ),
+    "A,generic/standard,K=2; Ti=10,gain=1,,,,,5 %,": (
+        "load: '5 %' is no step; write its size in %, such as 5, or when and its size, such as 60,5"
+    ),
+    "A,generic/standard,K=2; Ti=10,gain=1,,,,,,1 %": (
+        "time: '1 %' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+    ),
+    "A,generic/standard,K=2; Ti=10,gain=1,lag=10,,,,,,": (
+        "11 cells, the header has 10; put a cell that holds ',' in quotation marks"
+    ),
+    "A,generic/standard": "2 cells, the header has 10; put a cell that holds ',' in quotation marks",
+    'A,generic/standard,"K=2': ("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
+}
+
+WRONG["A" * 200_000] = "no row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
+
+
+@pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))
+def test_a_wrong_row_is_said_with_cause_and_remedy_and_the_others_are_loops(row: str, message: str, tmp_path: Path) -> None:
+    table = read(tmp_path, GOOD, row)
+    assert [(w.line, w.reason) for w in table.wrong] == [(3, message)]
+    assert [loop.tag for loop in table.loops] == ["FIC-1"]
+
+
+def test_a_card_of_one_s_own_that_is_wrong_is_said_in_one_line(tmp_path: Path) -> None:
+    written(tmp_path, edited(VALID, ("form: standard", "form: serial")))
+    (tmp_path / "loops.csv").write_text(f"{HEAD}\nA,nobody/bench,GAIN=1,gain=1,,,,,,\n", encoding="utf-8")
+    (wrong,) = read_loops(tmp_path / "loops.csv", vendors=[tmp_path]).wrong
+    assert wrong.reason.endswith("bench.yaml:7:7: 'serial' is not one of 'parallel', 'standard', 'series' or 'dahlin' "
+                                 "(did you mean 'series'?)")  # fmt: skip
+
+
+HEADERS = {
+    "tag,card,settngs,process,proces": (
+        "1: unknown columns 'settngs' (did you mean 'settings'?), 'proces' (did you mean 'process'?); columns: "
+        "tag, card, settings, process, scan, action, limits, setpoint, load, time"
+    ),
+    "tag,card,settings,process,unit": (
+        "1: unknown column 'unit'; columns: tag, card, settings, process, scan, action, limits, setpoint, load, time"
+    ),
+    "tag,card,settings": "1: no column 'process'; tag, card, settings, process are needed",
+    "tag,card,settings,process,Tag": "1: the column 'tag' comes twice; keep one",
+    'tag,"card': "1: a quotation mark is not closed; a row is one line, and a mark within a cell is doubled",
+}
+
+
+@pytest.mark.parametrize(("head", "message"), HEADERS.items())
+def test_a_wrong_header_is_refused(head: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(FleetError) as error:
+        read(tmp_path, GOOD, head=head)
+    assert str(error.value) == f"{tmp_path / 'loops.csv'}:{message}"
+
+
+def test_a_file_without_loops_or_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "loops.csv"
+    with pytest.raises(FleetError, match="no loops; the file has a header line such as tag,card,settings,process and one"):
+        read(tmp_path)
+    path.write_bytes("tag,card,settings,process\nKühler,a/b,,gain=1\n".encode("latin-1"))
+    with pytest.raises(FleetError, match="not UTF-8 text; save the file as UTF-8"):
+        read_loops(path)
+    with pytest.raises(FleetError, match="cannot be read: No such file or directory"):
+        read_loops(tmp_path / "none.csv")
+    with pytest.raises(CardNotFoundError, match="no folder 'nowhere'"):
+        read_loops(path, vendors=["nowhere"])
+
+
+def test_the_written_table_has_every_row_of_the_file_in_its_order(tmp_path: Path) -> None:
+    table = read(tmp_path, GOOD, "A,no/card,,gain=1,,,,,,", GOOD.replace("FIC-1", "FIC-2"))
+    result = pidemu.Fleet(table.loops).simulate(engine="python")
+    table.write(tmp_path / "out.csv", result)
+    with (tmp_path / "out.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(HEADER)
+    assert [(row["tag"], row["status"]) for row in rows] == [("FIC-1", "done"), ("A", "failed"), ("FIC-2", "done")]
+    assert rows[1]["reason"] == "no card 'no/card'; 'pidemu cards' lists them"
+    assert [row["line"] for row in table.rows(result)] == [2, 3, 4]
+    assert [float(rows[i]["iae"]) for i in (0, 2)] == result.columns["iae"].tolist()
+
+
+def test_where_no_row_makes_a_loop_the_table_has_the_failures(tmp_path: Path) -> None:
+    table = read(tmp_path, "A,no/card,,gain=1,,,,,,")
+    assert table.loops == ()
+    assert [(row["tag"], row["status"], row["iae"]) for row in table.rows(None)] == [("A", "failed", None)]
+
+
+def test_a_table_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    table = read(tmp_path, "A,no/card,,gain=1,,,,,,")
+    with pytest.raises(FleetError, match=r"nowhere/out\.csv: cannot be written: No such file or directory"):
+        table.write(tmp_path / "nowhere" / "out.csv", None)
