@@ -300,7 +300,7 @@ def test_every_assignment_and_quantity_is_explained() -> None:
     program = program_of("fisher/provox", {"GAIN": 2, "RESET": 4, "RATE": 0.5})
     lines = source(program, "pid").splitlines()
     for assign in program.body:
-        assert any(f" {assign.name} = " in line and line.endswith(f"/* {assign.text} */") for line in lines)
+        assert any(f" {assign.name} = " in line and line.endswith(f"/* {assign.text} [{assign.unit}] */") for line in lines)
     for q in (*program.coefficients, *program.states):
         assert any(
             line.split() == f"double {q.name}; /* {q.text} [{q.unit}] */".split() for line in header(program, "pid").splitlines()

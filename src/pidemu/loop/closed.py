@@ -36,14 +36,14 @@ class Parts:
         self.states.append((Quantity(name, text, unit), initial))
         return Name(name)
 
-    def first(self, name: str, value: Operand, text: str) -> Name:
+    def first(self, name: str, value: Operand, text: str, unit: str = "%") -> Name:
         """Assign at the start of the scan."""
-        self.before.append(Assign(name, expr(value), text))
+        self.before.append(Assign(name, expr(value), text, unit))
         return Name(name)
 
-    def then(self, name: str, value: Operand, text: str) -> Name:
+    def then(self, name: str, value: Operand, text: str, unit: str = "%") -> Name:
         """Assign at the end of the scan."""
-        self.after.append(Assign(name, expr(value), text))
+        self.after.append(Assign(name, expr(value), text, unit))
         return Name(name)
 
     def added(self, program: Program, wide: tuple[str, ...] = ()) -> Program:
@@ -90,8 +90,8 @@ def closed_loop(
     if not own:
         low = p.coefficient("span_low", span[0], "0 % in the controller's units", "units")
         per = p.coefficient("span_per", (span[1] - span[0]) / 100, "the controller's units per percent", "units/%")
-        p.first("sp", low + Name(setpoint) * per, "setpoint in the controller's units")
-        p.first("pv", low + Name(y) * per, "measurement in the controller's units")
+        p.first("sp", low + Name(setpoint) * per, "setpoint in the controller's units", "units")
+        p.first("pv", low + Name(y) * per, "measurement in the controller's units", "units")
     output = controller.output
     if output_span != PERCENT:
         bottom = p.coefficient("output_low", output_span[0], "0 % of the output in the controller's units", "units")

@@ -87,7 +87,7 @@ def experiment(program: Program, steps: Steps, measuring: Measuring | None = Non
         h = p.coefficient("scan_h", measuring.scan, "scan interval", "s")
         _errors(p, Name(setpoint) - Name(program.also[0]), measuring.start, h)
         _outputs(p, Name(program.output), measuring, h)
-    p.then(n.id, n + 1.0, "scans so far")
+    p.then(n.id, n + 1.0, "scans so far", "-")
     return p.added(replace(program, inputs=()))
 
 
@@ -98,7 +98,7 @@ def _errors(p: Parts, error: Expr, start: int, h: Name) -> None:
     crossing = (was * was + now * now) / (2.0 * _size(p, "error_move", was - now))
     share = select(was * now < 0.0, crossing, straight)
     iae = p.state("iae", "integral of the absolute error", "% s")
-    p.then(iae.id, iae + select(first < _SCAN, share * h, 0.0), "area along the straight line from the last scan")
+    p.then(iae.id, iae + select(first < _SCAN, share * h, 0.0), "area along the straight line from the last scan", "% s")
     p.then(was.id, now, "kept for the next scan")
     size, peak = _size(p, "error", now), p.state("peak", "largest absolute error")
     p.then(peak.id, select((first <= _SCAN) & (size > peak), size, peak), "largest absolute error")
@@ -114,7 +114,7 @@ def _outputs(p: Parts, u: Name, measuring: Measuring, h: Name) -> None:
     )
     for name, reached in (("at_low", u <= low), ("at_high", u >= high)):
         time = p.state(name, "time at the output limit", "s")
-        p.then(name, time + select(reached, h, 0.0), "time at the output limit")
+        p.then(name, time + select(reached, h, 0.0), "time at the output limit", "s")
 
 
 def _size(p: Parts, name: str, x: Expr) -> Expr:

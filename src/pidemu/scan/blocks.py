@@ -59,9 +59,10 @@ class Builder:
         self._states.setdefault(name, (Quantity(name, text, unit), initial))
         return Name(name)
 
-    def let(self, name: str, value: Operand, text: str) -> Name:
-        """Add an assignment."""
-        self._body.append(Assign(name, expr(value), text))
+    def let(self, name: str, value: Operand, text: str, unit: str = "%") -> Name:
+        """Add an assignment; that to a state has the state's unit."""
+        unit = self._states[name][0].unit if name in self._states else unit
+        self._body.append(Assign(name, expr(value), text, unit))
         return Name(name)
 
     def has(self, signal: str) -> bool:

@@ -44,8 +44,8 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     counts = b.coefficient("counts", float(a.counts), "counts per percent", "1/%")
     fine = b.coefficient("fine", float(a.gain_counts), "parts of a count that the output sum is kept in", "-")
     kp = b.coefficient("kp_counts", _whole(a.kp * a.gain_counts, "gain"), "gain in counts, signed for action", "-")
-    y = b.let("y_c", _whole_counts(t.signals.y, counts), "measurement in counts")
-    e = b.let("e_c", _whole_counts(t.signals.r, counts) - y, "error in counts")
+    y = b.let("y_c", _whole_counts(t.signals.y, counts), "measurement in counts", "-")
+    e = b.let("e_c", _whole_counts(t.signals.r, counts) - y, "error in counts", "-")
     parts: list[Expr] = [_proportional(b, e, t)]
     if a.ki:
         parts.append(_integral(b, e, _ticks(h, "scan interval"), _ticks(a.kp / a.ki, "integral time")))
@@ -56,7 +56,7 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     total = b.state("M", "output sum, in parts of a count", "-")
     resting = Floor(t.u * counts * fine + 0.5)
     b.let("M", select(t.on, total, resting), "at a transfer the sum is the last output (section 6)")
-    moved = b.let("dM", kp * blocks.summed(parts), "increment of the output sum")
+    moved = b.let("dM", kp * blocks.summed(parts), "increment of the output sum", "-")
     b.let("M", select(t.on, total + moved, total), "no increment at a transfer, bumpless (section 6)")
     b.let("M", blocks.limited(total, t.low * counts * fine, t.high * counts * fine), "output limits (section 5)")
     out = b.let("out", blocks.limited(Floor(total / fine) / counts, t.low, t.high), "output in whole counts")
@@ -84,15 +84,15 @@ def _whole_counts(x: Expr, counts: Name) -> Expr:
 
 def _proportional(b: Builder, e: Expr, t: Terms) -> Expr:
     e1 = b.state("e1", "error in counts at the last scan", "-")
-    moved = b.let("dP", e - select(t.fresh, e, e1), "increment of the proportional term")
+    moved = b.let("dP", e - select(t.fresh, e, e1), "increment of the proportional term", "-")
     b.let("e1", e, "kept for the next scan")
     return moved
 
 
 def _divided(b: Builder, name: str, total: Expr, by: Name, remainder: Name, text: str) -> Name:
     """Divide whole numbers and carry the remainder to the next scan."""
-    whole = b.let(f"{name}_n", total, f"{text}, before the division")
-    result = b.let(name, Floor(whole / by), f"{text} (section 7)")
+    whole = b.let(f"{name}_n", total, f"{text}, before the division", "-")
+    result = b.let(name, Floor(whole / by), f"{text} (section 7)", "-")
     b.let(remainder.id, whole - result * by, "remainder, carried to the next scan (section 7)")
     return result
 

@@ -126,7 +126,8 @@ def _growth(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     grown = blocks.increment(b, t.w, t.fresh, rate, h, a.integral_rule, from_zero=a.integral_from_zero)
     if a.integral_deadband is not None:
         band = b.coefficient("i_band", a.integral_deadband, "integral deadband", "%")
-        inside = b.let("i_still", select(blocks.magnitude(t.signals.e) <= band, 1.0, 0.0), "within the integral's deadband") > 0.0
+        still = select(blocks.magnitude(t.signals.e) <= band, 1.0, 0.0)
+        inside = b.let("i_still", still, "within the integral's deadband", "-") > 0.0
         grown = b.let("dI", select(inside, 0.0, grown), "no integration within the integral's deadband (section 8)")
     return grown
 
@@ -169,7 +170,7 @@ def _hastened(
     down = select(hastened > high, high, hastened) if flipped else select(hastened < high, high, hastened)
     up = select(hastened < low, low, hastened) if flipped else select(hastened > low, low, hastened)
     from_high, from_low = (ahead > t.high) & (pushes < 0.0), (ahead < t.low) & (pushes > 0.0)
-    b.let("fast_now", select(from_high | from_low, 1.0, 0.0), "on the way back from a limit")
+    b.let("fast_now", select(from_high | from_low, 1.0, 0.0), "on the way back from a limit", "-")
     b.let("dI", select(from_high, down, select(from_low, up, grown)), "fast return from a limit (section 5)")
 
 

@@ -173,11 +173,14 @@ class Assign:
         To what.
     text : str
         The block it belongs to, with its section of specs/equations.md.
+    unit : str
+        Unit of the value.
     """
 
     name: str
     value: Expr
     text: str
+    unit: str = "%"
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,7 +59,7 @@ def _of_the_mode(b: Builder, a: Algorithm, t: Terms, in_cascade: float) -> Expr:
     weight: Expr = b.coefficient("b_auto", a.b, "setpoint weight in automatic", "-")
     if s.cascade is not None:
         other = b.coefficient("b_cascade", in_cascade, "setpoint weight in cascade", "-")
-        weight = b.let("b_now", select(s.cascade, other, weight), "setpoint weight in this mode")
+        weight = b.let("b_now", select(s.cascade, other, weight), "setpoint weight in this mode", "-")
     kp = b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%")
     if a.shape is None:
         change: Expr = weight * (s.r - r1) - (s.y - y1)

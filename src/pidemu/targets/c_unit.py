@@ -177,7 +177,7 @@ def _assignments(unit: Unit, program: Program, there: set[str]) -> Iterable[str]
         else:
             code = _variable(unit, assign.name, times.count(assign.name) > 1, value)
             there = there | {assign.name}
-        yield said(code, assign.text)
+        yield said(code, f"{assign.text} [{assign.unit}]")
 
 
 def _entering(unit: Unit, line: Line) -> list[str]:
