@@ -117,7 +117,7 @@ def _measured(p: Parts, process: SampledProcess, x: list[Name], y: str, rest: fl
     level = p.coefficient("measurement_rest", rest, "measurement at which the process is at rest")
     weights = [*process.row.tolist(), process.through]
     parts: list[Expr] = [
-        state if weight == 1 else p.coefficient(f"process_c{i}", weight, "measurement per state", "-") * state
+        p.coefficient(f"process_c{i}", weight, "measurement per state", "-") * state
         for i, (weight, state) in enumerate(zip(weights, x, strict=True), 1)
         if weight
     ]
