@@ -224,7 +224,9 @@ class Settings(Mapping[str, Value]):
         """
         from pidemu.canonical import algorithm_of  # numbers are made from settings, not settings from numbers
 
-        key = (own_units, scan)
+        equation = self.equation
+        filtered = (equation.setpoint, equation.measurement, equation.error) != (None, None, None)
+        key = (own_units and equation.signals == "engineering", scan if filtered else None)  # what makes a difference
         if key not in self._algorithms:
             self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan)
         return self._algorithms[key]
