@@ -13,14 +13,15 @@ import pytest
 import pidemu
 from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible
-from pidemu.engines import ENGINES, Engine, block
+from pidemu.engines import ENGINES, Engine, block, has_numba
 from pidemu.settings import Settings
 from pidemu.targets.python import compiled, starting
 
 Floats = npt.NDArray[np.float64]
 CARDS = [pytest.param(card_id, id=card_id) for card_id in card_files()]
 COMPILER = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler on this machine")
-OTHERS = [pytest.param(e, marks=COMPILER) if e == "c" else e for e in ENGINES if e != "python"]
+NUMBA = pytest.mark.skipif(not has_numba(), reason="there is no Numba for this machine")
+OTHERS = [pytest.param(e, marks={"c": COMPILER, "numba": NUMBA}.get(e, ())) for e in ENGINES if e != "python"]
 SCANS = 600
 
 
@@ -66,7 +67,7 @@ def test_a_controller_gives_the_same_bits_in_every_engine(card_id: str, engine: 
     assert repr(other.events) == repr(reference.events)  # a bump may be NaN
 
 
-@pytest.mark.parametrize("engine", ["numpy", "numba"])
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=NUMBA)])
 @pytest.mark.parametrize("card_id", CARDS)
 def test_loops_side_by_side_give_the_bits_of_loops_alone(card_id: str, engine: Engine) -> None:
     settings = settings_of(card_id)
