@@ -153,7 +153,7 @@ def test_signals_and_parquet_hold_what_a_simulation_gives(folder: Path) -> None:
     place = rows("kept/signals.csv")["TIC-2"]
     block = np.load(folder / "kept" / place["file"])
     ran = simulated()
-    assert block[0, :, int(place["loop"])].tolist() == ran.output.tolist()
+    assert block[0, : int(place["scans"]), int(place["loop"])].tolist() == ran.output.tolist()
     table = {row["tag"]: row for row in pq.read_table(folder / "kept.parquet").to_pylist()}
     assert table["TIC-2"]["measurement"] == ran.measurement.tolist()
 
@@ -199,7 +199,7 @@ def test_ctrl_c_ends_the_run_and_prints_and_writes_what_is_done(folder: Path) ->
     (folder / "long.csv").write_text(HEAD + FAST + loops, encoding="utf-8")
     words = ["fleet", "long.csv", "--engine", "python", "--cores", "1", "--signals", "kept", "--table", "out.csv"]
     process = subprocess.Popen([sys.executable, "-m", "pidemu", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not (folder / "kept" / "block-00003.npy").exists():  # two blocks are done then
+    while len(list(folder.glob("kept/block-*.npy"))) < 3:  # two blocks are done then
         time.sleep(0.02)
         assert process.poll() is None, process.communicate()
     process.send_signal(signal.SIGINT)

@@ -32,14 +32,7 @@ from pidemu.plain import json_safe
 _ROWS: Final = 20
 """Loops that are shown; a plant has thousands."""
 _RAN: Final = ("done", "ran away")
-_COLUMNS: Final = {
-    "IAE [% s]": "iae",
-    "largest error [%]": "peak",
-    "travel [%]": "travel",
-    "at low [s]": "at_low",
-    "at high [s]": "at_high",
-    "last error [%]": "error",
-}
+_COLUMNS: Final = ("tag", "card", "scan", "IAE [% s]", "peak [%]", "travel [%]", "at limits [s]", "error [%]")
 
 
 @click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
@@ -78,6 +71,9 @@ def command(
     Columns: tag, card, settings (GAIN=2; RESET=4; RATE=6 s), process (gain=1, lag=20, delay=3) and, where wanted, scan, action,
     limits, setpoint, load, time. What a row says goes before --setpoint, --load and --time. A row that is wrong does not stop the
     others: it is reported, and the exit status is 1.
+
+    Shown are the largest absolute error (peak) and its integral (IAE), from the load step on or from the start where there is none;
+    how far the output travelled, how long it was at its limits, and the last error.
     """
     if scheduler is not None and cores is not None:
         raise click.UsageError("--cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out")
@@ -147,7 +143,8 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
     if ran:
         heading(f"\nThe {_ROWS} loops with the largest IAE" if len(ran) > _ROWS else "\nLoops, the largest IAE first")
         worst = sorted(ran, key=_badness, reverse=True)[:_ROWS]
-        table(["tag", "card", "scan", *_COLUMNS, ""], [_cells(row) for row in worst], right=range(2, 3 + len(_COLUMNS)))
+        away = [""] if any(row["status"] == "ran away" for row in worst) else []
+        table([*_COLUMNS, *away], [_cells(row)[: len(_COLUMNS) + len(away)] for row in worst], right=range(2, len(_COLUMNS)))
     failed = [row for row in rows if row["status"] == "failed"]
     if failed:
         heading("\nFailed")
@@ -158,7 +155,7 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
     """Return a row of the table for people; what ran away says so at its end."""
-    figures = (_figure(row[name]) for name in _COLUMNS.values())
+    figures = map(_figure, (row["iae"], row["peak"], row["travel"], row["at_low"] + row["at_high"], row["error"]))
     return [row["tag"], row["card"], f"{number(row['scan'])} s", *figures, "ran away" if row["status"] == "ran away" else ""]
 
 
@@ -173,4 +170,4 @@ def _badness(row: Mapping[str, Any]) -> float:
 
 
 def _figure(x: float) -> str:
-    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))
+    return "-" if math.isnan(x) else number(float(f"{x:.3g}")) if abs(x) < 1 else number(float(f"{x:.4g}"))
