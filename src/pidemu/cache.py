@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -15,18 +17,20 @@ def folder() -> Path:
     """Return the folder for generated code of this version of pidemu; it exists and can be written.
 
     It is that of the environment variable ``PIDEMU_CACHE``, or the user's cache folder where the system has one; where that cannot
-    be written, a folder among the temporary files, for this process alone.
+    be written, a folder among the temporary files, for this process alone and removed at its end.
     """
     import platformdirs
 
-    chosen = os.environ.get("PIDEMU_CACHE") or platformdirs.user_cache_dir("pidemu", appauthor=False)
-    path = Path(chosen).expanduser().absolute() / __version__
     try:
+        chosen = os.environ.get("PIDEMU_CACHE") or platformdirs.user_cache_dir("pidemu", appauthor=False)
+        path = Path(chosen).expanduser().absolute() / __version__
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
             return path
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="pidemu-"))
+    except (OSError, RuntimeError):  # the latter where the user has no home
+        path = Path(tempfile.mkdtemp(prefix="pidemu-"))
+        atexit.register(shutil.rmtree, path, ignore_errors=True)
+        return path
 
 
 def written(name: str, text: str) -> Path:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pidemu.engines import Choice
-from pidemu.fleet.prepare import Group, Prepared
+from pidemu.fleet.prepare import Prepared
 from pidemu.loop.experiment import FIGURES
 from pidemu.loop.simulation import run_trial
 from pidemu.loop.trial import Trial
@@ -37,11 +38,13 @@ class Outcome:
     columns : dict of str to ndarray, shape (loops,)
         What `COLUMNS` names.
     records : ndarray, shape (2, scans, loops or more), or None
-        Output and measurement [%], where they are kept.
+        Output and measurement [%], where they are kept in memory; NaN after a loop's last scan.
     engine : Choice
         What ran it.
     ran_away : frozenset of int
         Places in the fleet of loops whose measurement outgrew all numbers.
+    file : Path or None
+        The NumPy file that holds the records, where they are kept in files.
     """
 
     members: tuple[Prepared, ...]
@@ -49,6 +52,7 @@ class Outcome:
     records: Floats | None
     engine: Choice
     ran_away: frozenset[int] = frozenset()
+    file: Path | None = None
 
 
 class Stopped(Exception):  # noqa: N818 (no error)
@@ -56,7 +60,6 @@ class Stopped(Exception):  # noqa: N818 (no error)
 
 
 def run_block(
-    group: Group,
     members: Sequence[Prepared],
     engine: Choice,
     function: Block,
@@ -64,20 +67,18 @@ def run_block(
     room: Room | None,
     stop: Callable[[], bool],
 ) -> Outcome:
-    """Run loops of a group side by side.
+    """Run loops of a group side by side, until the last of them is done.
 
     Parameters
     ----------
-    group : Group
-        The group.
     members : sequence of Prepared
-        At most `width` of its loops; the block is filled up with copies of the last one.
+        At most `width` loops of one structure, in the order of their numbers of scans.
     engine : Choice
         What runs them, for the record.
     function : Block
-        The engine's function for the group's structure.
+        The engine's function for their structure.
     width : int
-        Loops in a block.
+        Loops in a block: it is filled up with copies of the last one.
     room : callable or None
         Where signals that are kept go.
     stop : callable
@@ -88,25 +89,40 @@ def run_block(
     Stopped
         It said so.
     """
+    structure, scans = members[0].structure, members[-1].trial.scans
     filled = [*members, *[members[-1]] * (width - len(members))]
     values, states = (np.array([getattr(m, what) for m in filled]).T.copy() for what in ("values", "initial"))
-    lengths = np.array([m.lengths for m in filled], dtype=np.int64).reshape(width, -1).T.copy()
+    under_way = [[min(n, m.trial.scans) for n in m.lengths] for m in filled]  # what comes later than the last scan is not seen
+    lengths = np.array(under_way, dtype=np.int64).reshape(width, -1).T.copy()
     rings = np.zeros((len(lengths), int(lengths.max(initial=0)) + 1, width))
-    at_once = max(64, _IN_CACHE // width)
-    shape = (len(group.structure.recorded), group.scans, width)
+    at_once = min(scans, max(64, _IN_CACHE // width))
+    shape = (len(structure.recorded), scans, width)
     records = None if room is None else room(shape)
-    buffer = np.empty((shape[0], min(at_once, group.scans), width)) if records is None else None
-    for at in range(0, group.scans, at_once):
+    buffer = np.empty((shape[0], at_once, width)) if records is None else None
+    ends = [m.trial.scans for m in members]
+    places = [structure.states.index(name) for name in (*FIGURES, "error_was")]
+    columns = np.empty((len(places), len(members)))
+    done = 0
+    for at, end in _spans(ends, at_once):
         if stop():
             raise Stopped
-        count = min(at_once, group.scans - at)
-        part = records[:, at : at + count] if records is not None else buffer[:, :count]  # type: ignore[index]  # one of them is there
-        function(values, states, np.empty((0, count, width)), rings, lengths, at, part)
-    names = group.structure.states
-    columns = {name: states[names.index(name), : len(members)] for name in FIGURES}
-    columns["error"] = states[names.index("error_was"), : len(members)]
-    away = frozenset(_mend(members, columns, records))
-    return Outcome(tuple(members), columns, records, engine, away)
+        part = records[:, at:end] if records is not None else buffer[:, : end - at]  # type: ignore[index]  # one of them is there
+        function(values, states, np.empty((0, end - at, width)), rings, lengths, at, part)
+        part[:, :, :done] = np.nan
+        while done < len(ends) and ends[done] == end:
+            columns[:, done] = states[places, done]
+            done += 1
+    found = dict(zip(COLUMNS, columns, strict=True))
+    return Outcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
+
+
+def _spans(ends: Sequence[int], at_once: int) -> Iterator[tuple[int, int]]:
+    """Yield from where to where a block is run in one go: no longer than `at_once`, and to each of the ends."""
+    at = 0
+    for end in sorted(set(ends)):
+        while at < end:
+            yield at, min(at + at_once, end)
+            at = min(at + at_once, end)
 
 
 def _mend(members: Sequence[Prepared], columns: dict[str, Floats], records: Floats | None) -> list[int]:
@@ -119,7 +135,7 @@ def _mend(members: Sequence[Prepared], columns: dict[str, Floats], records: Floa
         for name, value in figures_of(member.trial, pv, out).items():
             columns[name][i] = value
         if records is not None:
-            records[:, :, i] = out, pv
+            records[:, : member.trial.scans, i] = out, pv
         away.append(member.place)
     return away
 

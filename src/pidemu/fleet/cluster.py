@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import itertools
+import socket
 import time
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -24,7 +25,10 @@ _SECONDS: Final = 3.0
 """How long a chunk should take: much longer than Dask needs for a task, short enough to be done again where a worker is lost."""
 _MOST: Final = 4096
 _AHEAD: Final = 3
-"""Chunks per worker that are under way."""
+"""Chunks per thread of a worker that are under way."""
+_PATIENCE: Final = 10.0
+"""How long a scheduler may take to answer [s]."""
+_LOST: Final = "the cluster was lost; run the loop again"
 
 Numbered = tuple[int, Loop]
 
@@ -33,7 +37,7 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan) -> Generato
     """Run loops on a cluster, and yield what comes of them as it is done.
 
     The numbers are those of one machine: a loop's do not depend on the loops beside it. Chunks of a worker that is lost are run
-    again by Dask on another one.
+    again by Dask on another one; where the whole cluster is lost, the loops that are left fail.
 
     Parameters
     ----------
@@ -51,28 +55,44 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan) -> Generato
     """
     distributed = _distributed()
     with _client(distributed, cluster) as client:
-        source, size = iter(loops), _FIRST
-        chunks: dict[Any, list[Numbered]] = {}
+        yield from _Chunks(distributed, client, loops, plan).outcomes()
 
-        def submitted(count: int) -> Iterator[Any]:
-            for _ in range(count):
-                chunk = list(itertools.islice(source, size))
-                if chunk:
-                    future = client.submit(run_chunk, chunk, plan, pure=False, retries=2)
-                    chunks[future] = chunk
-                    yield future
 
-        done = distributed.as_completed(submitted(_AHEAD * _workers(client)))
+class _Chunks:
+    """Chunks of loops: as many under way as keep all threads of the cluster busy, each of some seconds."""
+
+    def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: Plan) -> None:
+        self._distributed, self._client, self._plan = distributed, client, plan
+        self._loops, self._size = iter(loops), _FIRST
+        self._under_way: dict[Any, list[Numbered]] = {}
+
+    def outcomes(self) -> Iterator[Outcome | Failed]:
+        """Yield what comes of the loops."""
+        done = self._distributed.as_completed(self._submitted(), loop=self._client.loop)
         try:
             for future in done:
-                chunk = chunks.pop(future)
+                if future.cancelled():
+                    break
+                chunk = self._under_way.pop(future)
                 found, seconds = _result(future, chunk)
                 yield from found
-                size = _next_size(size, len(chunk), seconds)
-                for new in submitted(1):
-                    done.add(new)
+                self._size = _next_size(self._size, len(chunk), seconds)
+                if self._client.status == "running":
+                    done.update(self._submitted())
+            left = itertools.chain(*self._under_way.values(), self._loops)
+            yield from (Failed(place, _LOST) for place, _ in left)
         finally:
-            client.cancel(list(chunks))
+            if self._client.status == "running":
+                self._client.cancel(list(self._under_way))
+
+    def _submitted(self) -> list[Any]:
+        """Submit further chunks; workers may have come or gone."""
+        threads = max(1, sum(self._client.nthreads().values()))
+        new = []
+        while len(self._under_way) < _AHEAD * threads and (chunk := list(itertools.islice(self._loops, self._size))):
+            new.append(self._client.submit(run_chunk, chunk, self._plan, pure=False, retries=2))
+            self._under_way[new[-1]] = chunk
+        return new
 
 
 def run_chunk(chunk: Sequence[Numbered], plan: Plan) -> tuple[list[Outcome | Failed], float]:
@@ -111,10 +131,6 @@ def _next_size(size: int, loops: int, seconds: float) -> int:
     return max(1, min(wanted, 4 * size, _MOST))
 
 
-def _workers(client: Any) -> int:
-    return max(1, len(client.scheduler_info()["workers"]))
-
-
 def _distributed() -> Any:
     try:
         return importlib.import_module("distributed")
@@ -130,8 +146,10 @@ def _client(distributed: Any, cluster: Any) -> Iterator[Any]:
         yield cluster
         return
     try:
-        client = distributed.Client(cluster, timeout=10)
-    except (OSError, TimeoutError, ValueError) as error:
+        if isinstance(cluster, str):
+            _wait_for(*distributed.comm.get_address_host_port(cluster))
+        client = distributed.Client(cluster, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise FleetError(
             f"no scheduler answers at {cluster}: {error}; start one with 'dask scheduler', and give its address"
         ) from None
@@ -139,3 +157,23 @@ def _client(distributed: Any, cluster: Any) -> Iterator[Any]:
         yield client
     finally:
         client.close()
+
+
+def _wait_for(host: str, port: int) -> None:
+    """Wait until something listens; a Dask client that finds nothing leaves threads behind.
+
+    Raises
+    ------
+    OSError
+        Nothing does.
+    """
+    end = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            socket.create_connection((host, port), timeout=_PATIENCE).close()
+        except OSError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(min(0.2, _PATIENCE))
+        else:
+            return

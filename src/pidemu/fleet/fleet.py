@@ -74,11 +74,12 @@ class Fleet:
         time : float, optional
             How long, for loops that do not say [s]; by default as long as each takes to settle.
         keep : bool
-            Keep measurement and output of every scan.
+            Keep measurement and output of every scan, in memory where no folder is given.
         folder : str or Path, optional
             Keep them in files of this folder, not in memory (NumPy files, one per block of loops).
         parquet : str or Path, optional
-            Write table and signals to this Parquet file, a row per loop (needs the extra ``parquet``).
+            Write figures and signals to this Parquet file, a row per loop that ran (needs the extra ``parquet``); without `keep` or
+            a folder they are nowhere else.
         engine : {"python", "numpy", "numba", "c"}, optional
             What runs the loops; all give the same bits. By default the quickest for each group of loops.
         cores : int, optional
@@ -103,12 +104,11 @@ class Fleet:
         if cores is not None and cores < 1:
             raise FleetError(f"{cores} cores cannot run anything; give at least 1")
         result = FleetResult(self.loops)
-        store = SignalStore(folder, parquet) if keep or folder is not None or parquet is not None else None
-        plan = Plan(setpoint, load, time, store is not None, checked(engine))
+        keeps = keep or folder is not None or parquet is not None
+        plan = Plan(setpoint, load, time, keeps, checked(engine))
         with contextlib.ExitStack() as stack:
+            store = stack.enter_context(SignalStore(keep, folder, parquet)) if keeps else None
             bar = stack.enter_context(Progress(len(self.loops), progress))
-            if store is not None:
-                stack.enter_context(store)
             found = stack.enter_context(contextlib.closing(self._outcomes(plan, cores, cluster, store)))
             try:
                 for one in found:

@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import itertools
 import os
+import queue
 import threading
-from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.engines import block, for_loops
+from pidemu.engines import Choice, block, for_loops
 from pidemu.fleet.blocks import Outcome, Room, run_block
 from pidemu.fleet.loops import Loop, Plan
 from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared
+from pidemu.scan.program import Structure
 from pidemu.targets.runner import Block
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
 """Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""
+_SIDE_BY_SIDE: Final = ("numpy", "numba")
+"""Engines that take about as long for a block as for its longest loop; the others run one loop after the other."""
 _TURN: Final = threading.Lock()
 _AT_ONCE: Final = 8192
 """Loops that are prepared, and then run, at a time: what is in memory does not grow with the fleet."""
+_SLICE: Final = 128
+"""Loops that are prepared from one look at what is done to the next."""
+_LOOK: Final = 0.5
+"""Seconds after which a wait begins anew: where the system does not interrupt one, Ctrl-C is seen then."""
 
 
 def cores_here() -> int:
@@ -45,38 +53,76 @@ def outcomes(
     room : callable, optional
         From a shape to the array that takes a block's signals; by default they are not kept.
     """
-    stop = threading.Event()
     count = cores or cores_here()
-    pool = ThreadPoolExecutor(count, thread_name_prefix="fleet")
-    under_way: set[Future[Outcome]] = set()
+    threads = _Threads(count, plan, room)
     try:
         source = iter(loops)
         while some := list(itertools.islice(source, _AT_ONCE)):
             ready: list[Prepared] = []
-            for found in prepared(some, plan):
-                if isinstance(found, Failed):
-                    yield found
-                else:
-                    ready.append(found)
+            shared: dict[Structure, Structure] = {}
+            for start in range(0, len(some), _SLICE):
+                for found in prepared(some[start : start + _SLICE], plan, shared):
+                    if isinstance(found, Failed):
+                        yield found
+                    else:
+                        ready.append(found)
+                yield from threads.done()
+            yield from threads.done(2 * count)
             for group in grouped(ready):
-                under_way |= _started(pool, group, plan, room, stop)
-            while len(under_way) > 2 * count:
-                yield from _done(under_way)
-        while under_way:
-            yield from _done(under_way)
+                threads.start(group)
+        yield from threads.done(0)
     finally:
-        stop.set()
-        pool.shutdown(cancel_futures=True)
+        threads.close()
 
 
-def _started(pool: ThreadPoolExecutor, group: Group, plan: Plan, room: Room | None, stop: threading.Event) -> set[Future[Outcome]]:
-    choice = for_loops(group.structure, group.scans, len(group.members), plan.engine)
-    function, most = block(group.structure, choice.engine)
-    if choice.engine in _ONE_AT_A_TIME:
-        function = _in_turn(function)
-    width = most if choice.engine == "numba" else min(most, len(group.members))
-    parts = (group.members[start : start + width] for start in range(0, len(group.members), width))
-    return {pool.submit(run_block, group, part, choice, function, width, room, stop.is_set) for part in parts}
+class _Threads:
+    """Threads that run blocks. Where signals are kept, they wait while many blocks are done that nobody has taken yet."""
+
+    def __init__(self, count: int, plan: Plan, room: Room | None) -> None:
+        self._plan, self._room = plan, room
+        self._stop = threading.Event()
+        self._free = None if room is None else threading.Semaphore(2 * count)
+        self._pool = ThreadPoolExecutor(count, thread_name_prefix="fleet")
+        self._done: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
+        self._left = 0
+
+    def start(self, group: Group) -> None:
+        """Run a group of loops."""
+        choice = for_loops(group.structure, group.scans, len(group.members), self._plan.engine)
+        function, width = block(group.structure, choice.engine)
+        if choice.engine in _ONE_AT_A_TIME:
+            function = _in_turn(function)
+        for part in group.parts(width, 2 if choice.engine in _SIDE_BY_SIDE else 1):
+            lanes = width if choice.engine == "numba" else len(part)
+            self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
+            self._left += 1
+
+    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> Outcome:
+        if self._free is not None:
+            self._free.acquire()
+        return run_block(part, choice, function, width, self._room, self._stop.is_set)
+
+    def done(self, most: int | None = None) -> Iterator[Outcome]:
+        """Yield what is done; wait until at most so many blocks are left, or not at all."""
+        while self._left:
+            waits = most is not None and self._left > most
+            try:
+                future = self._done.get(block=waits, timeout=_LOOK)
+            except queue.Empty:
+                if waits:
+                    continue
+                return
+            self._left -= 1
+            yield future.result()
+            if self._free is not None:
+                self._free.release()
+
+    def close(self) -> None:
+        """End the threads; blocks under way stop."""
+        self._stop.set()
+        if self._free is not None:
+            self._free.release(self._left + 1)
+        self._pool.shutdown(cancel_futures=True)
 
 
 def _in_turn(function: Block) -> Block:
@@ -85,11 +131,3 @@ def _in_turn(function: Block) -> Block:
             function(*arguments, **named)
 
     return run
-
-
-def _done(under_way: set[Future[Outcome]]) -> Iterator[Outcome]:
-    """Yield what is done, and wait for the first where nothing is."""
-    done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-    for future in done:
-        under_way.discard(future)
-        yield future.result()

@@ -61,24 +61,43 @@ class Failed:
 
 @dataclass(frozen=True)
 class Group:
-    """Loops that share a structure and a number of scans.
+    """Loops that share a structure.
 
     Attributes
     ----------
     structure : Structure
         What their programs have in common.
-    scans : int
-        How many scans each does.
     members : tuple of Prepared
-        The loops, by dead time, so that a block's delay lines are of like length.
+        The loops, by number of scans and dead time, so that those of a block take equally long and have delay lines of like length.
     """
 
     structure: Structure
-    scans: int
     members: tuple[Prepared, ...]
 
+    @property
+    def scans(self) -> int:
+        """How many scans a loop does on average, rounded up."""
+        return -(-sum(m.trial.scans for m in self.members) // len(self.members))
 
-def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> list[Prepared | Failed]:
+    def parts(self, width: int, longer: int) -> Iterator[tuple[Prepared, ...]]:
+        """Yield the loops of one block after the other; a block runs until its last loop is done.
+
+        Parameters
+        ----------
+        width : int
+            At most so many loops in a block.
+        longer : int
+            None has more than so many times the scans of another.
+        """
+        start = 0
+        for i, member in enumerate(self.members):
+            if i - start == width or member.trial.scans > longer * self.members[start].trial.scans:
+                yield self.members[start:i]
+                start = i
+        yield self.members[start:]
+
+
+def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan, shared: dict[Structure, Structure]) -> list[Prepared | Failed]:
     """Return each loop as a program, or why it cannot be run.
 
     Parameters
@@ -87,8 +106,9 @@ def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan) -> list[Prepared | F
         Loops with their places in the fleet.
     plan : Plan
         What is done to them.
+    shared : dict
+        Structures that there are already; new ones are added, so that like loops share theirs.
     """
-    shared: dict[Structure, Structure] = {}
     with _no_collection():
         return [_prepared(place, loop, plan, shared) for place, loop in loops]
 
@@ -99,6 +119,8 @@ def _prepared(place: int, loop: Loop, plan: Plan, shared: dict[Structure, Struct
         program = measured(trial)
     except PidemuError as error:
         return Failed(place, str(error))
+    except Exception as error:  # such as a text for a number: one wrong loop among thousands stops no other
+        return Failed(place, f"{type(error).__name__}: {error}; give the loop what pidemu.Loop documents")
     structure = program.structure
     return Prepared(
         place, loop.tag, trial, shared.setdefault(structure, structure), program.values, program.initial, program.lengths
@@ -130,14 +152,14 @@ def measured(trial: Trial) -> Program:
 
 
 def grouped(members: Iterable[Prepared]) -> list[Group]:
-    """Return the loops by structure and number of scans.
+    """Return the loops by structure.
 
     Parameters
     ----------
     members : iterable of Prepared
         Loops that were prepared together, so that like ones share their structure.
     """
-    found: dict[tuple[int, int], list[Prepared]] = {}
+    found: dict[int, list[Prepared]] = {}
     for member in members:
-        found.setdefault((id(member.structure), member.trial.scans), []).append(member)
-    return [Group(some[0].structure, some[0].trial.scans, tuple(sorted(some, key=lambda m: m.lengths))) for some in found.values()]
+        found.setdefault(id(member.structure), []).append(member)
+    return [Group(some[0].structure, tuple(sorted(some, key=lambda m: (m.trial.scans, m.lengths)))) for some in found.values()]

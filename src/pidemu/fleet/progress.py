@@ -23,7 +23,7 @@ class Progress:
 
     def __init__(self, total: int, shown: bool | None) -> None:
         self._total = total
-        self._shown = sys.stderr.isatty() and total >= _LARGE if shown is None else shown
+        self._shown = bool(sys.stderr and sys.stderr.isatty() and total >= _LARGE) if shown is None else shown
         self._bar: Any = None
         self._task: Any = None
 

@@ -77,7 +77,7 @@ class FleetResult:
         self.scan, self.scans = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self.interrupted = False
         self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
-        self._signals: dict[int, tuple[Trial, Floats, int]] = {}
+        self._signals: dict[int, tuple[Trial, Floats | Path, int]] = {}
 
     def add(self, found: Outcome | Failed) -> int:
         """Take what came of a block, or of a loop that failed; return how many loops that is."""
@@ -92,8 +92,9 @@ class FleetResult:
             self.status[place] = "ran away" if place in found.ran_away else "done"
             self.scan[place], self.scans[place] = member.trial.scan, member.trial.scans
             self.engines[place] = found.engine.engine
-            if found.records is not None:
-                self._signals[place] = (member.trial, found.records, i)
+            kept = found.records if found.file is None else found.file
+            if kept is not None:
+                self._signals[place] = (member.trial, kept, i)
         return len(places)
 
     @property
@@ -127,8 +128,10 @@ class FleetResult:
                 if done
                 else f"loop '{tag}' has no signals: {self.reasons[place] or self.status[place]}"
             )
-        trial, records, lane = self._signals[place]
-        return Signals(trial.times, trial.setpoint, records[1, :, lane], records[0, :, lane])
+        trial, kept, lane = self._signals[place]
+        records = np.load(kept, mmap_mode="r") if isinstance(kept, Path) else kept
+        out, pv = np.array(records[:, : trial.scans, lane])
+        return Signals(trial.times, trial.setpoint, pv, out)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""
@@ -153,8 +156,16 @@ class FleetResult:
         ----------
         path : str or Path
             The file.
+
+        Raises
+        ------
+        FleetError
+            The file cannot be written.
         """
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, HEADER)
-            writer.writeheader()
-            writer.writerows(self.rows())
+        try:
+            with open(path, "w", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, HEADER)
+                writer.writeheader()
+                writer.writerows(self.rows())
+        except OSError as error:
+            raise FleetError(f"{path}: cannot be written: {error.strerror or error}; give a file that can") from None

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
+import os
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -19,21 +22,25 @@ Floats = npt.NDArray[np.float64]
 INDEX: Final = "signals.csv"
 """The file of a folder that says where the signals of each loop are."""
 _INDEX_HEADER: Final = ("tag", "file", "loop", "scan", "scans")
+_BLOCK: Final = "block-{}.npy"
+_OTHER_FILE: Final = "give a file that can be written, where there is enough room"
 
 
 class SignalStore:
     """Keeps the signals of a fleet, block by block, so that memory is bounded where they go to files.
 
-    In a folder, ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%]; `INDEX` names the file and the loop's
-    number in it for every tag. A Parquet file has a row per loop: tag, card, scan interval, figures, and the lists ``output`` and
-    ``measurement``.
+    In a folder, ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%], NaN after a loop's last scan; `INDEX`
+    names the file, the loop's number in it, scan interval [s] and number of scans for every tag. A Parquet file has a row per loop:
+    tag, card, scan interval, figures, and the lists ``output`` and ``measurement``; it appears when the run is over.
 
     Parameters
     ----------
+    keep : bool
+        Keep signals in memory where they do not go to a folder.
     folder : str or Path, optional
         Folder for NumPy files; it is made where it is not there, and holds no signals yet.
     parquet : str or Path, optional
-        Parquet file. With neither, signals stay in memory.
+        Parquet file.
 
     Raises
     ------
@@ -41,58 +48,81 @@ class SignalStore:
         The folder holds signals already, a place cannot be written, or pyarrow is not installed.
     """
 
-    def __init__(self, folder: str | Path | None = None, parquet: str | Path | None = None) -> None:
-        self._folder = None if folder is None else Path(folder)
+    def __init__(self, keep: bool = True, folder: str | Path | None = None, parquet: str | Path | None = None) -> None:
+        self._keep, self._folder = keep, None if folder is None else Path(folder)
         self._numbers = itertools.count(1)
+        self._unfinished: set[Path] = set()
         self._index: list[tuple[object, ...]] = []
-        self._parquet = None if parquet is None else _Parquet(Path(parquet))
         if self._folder is not None:
-            try:
+            with _writing(self._folder, "give a folder that can be made and written"):
                 self._folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise FleetError(f"{self._folder}: {error.strerror}; give a folder that can be made and written") from None
-            if (self._folder / INDEX).exists():
+            if (self._folder / INDEX).exists() or any(self._folder.glob(_BLOCK.format("*"))):
                 raise FleetError(f"{self._folder} holds the signals of a fleet already; give another folder, or empty it")
+        self._parquet = None if parquet is None else _Parquet(Path(parquet))
 
     def __enter__(self) -> SignalStore:
         return self
 
     def room(self, shape: tuple[int, int, int]) -> Floats:
-        """Return an array for the records of a block."""
+        """Return an array for the records of a block; several threads may ask at once.
+
+        Raises
+        ------
+        FleetError
+            The file cannot be written, or there is no room for it.
+        """
         if self._folder is None:
             return np.empty(shape)
-        path = self._folder / f"block-{next(self._numbers):05d}.npy"
-        found: Floats = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=shape)
+        path = self._folder / _BLOCK.format(f"{next(self._numbers):05d}")
+        self._unfinished.add(path)
+        with _writing(path, "give a folder that can be written, with enough room"):
+            found: Floats = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=shape)
+            if hasattr(os, "posix_fallocate"):  # what there is no room for is refused here, and does not end the process later
+                with path.open("r+b") as file:
+                    os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
         return found
 
     def stored(self, outcome: Outcome) -> Outcome:
-        """Write the records of a block, and return the outcome with them where they are kept."""
+        """Write the records of a block, and return the outcome with them, or with the file, where they are kept.
+
+        Raises
+        ------
+        FleetError
+            They cannot be written.
+        """
         assert outcome.records is not None
         if self._parquet is not None:
             self._parquet.write(outcome)
         if self._folder is None:
-            return outcome if self._parquet is None else replace(outcome, records=None)
+            return outcome if self._keep else replace(outcome, records=None)
         records = outcome.records
         if not isinstance(records, np.memmap):  # from a worker of a cluster
             here = self.room((records.shape[0], records.shape[1], records.shape[2]))
             here[:] = records
             records = here
         assert isinstance(records, np.memmap)
-        records.flush()
         path = Path(str(records.filename))
+        with _writing(path, "give a folder that can be written, with enough room"):
+            records.flush()
         self._index += [(m.tag, path.name, i, m.trial.scan, m.trial.scans) for i, m in enumerate(outcome.members)]
-        return replace(outcome, records=np.load(path, mmap_mode="r"))
+        self._unfinished.discard(path)
+        return replace(outcome, records=None, file=path)  # an open file for every block would be too many
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._parquet is not None:
-            self._parquet.close()
         if self._folder is not None:
-            with open(self._folder / INDEX, "w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows([_INDEX_HEADER, *self._index])
+            for path in self._unfinished:
+                with contextlib.suppress(OSError):
+                    path.unlink()
+            if self._index or kind is None:
+                index = self._folder / INDEX
+                with _writing(index, "give a folder that can be written"), index.open("w", newline="", encoding="utf-8") as file:
+                    csv.writer(file).writerows([_INDEX_HEADER, *self._index])
+        if self._parquet is not None:
+            self._parquet.close(finished=kind is None)
 
 
 class _Parquet:
-    """A Parquet file that grows by a row group per block."""
+    """A Parquet file that grows by a row group per block, under another name until it is finished."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -106,23 +136,39 @@ class _Parquet:
         text, number, numbers = pa.string(), pa.float64(), pa.list_(pa.float64())
         fields = [("tag", text), ("card", text), ("scan", number), *((name, number) for name in COLUMNS)]
         self._schema = pa.schema([*fields, ("output", numbers), ("measurement", numbers)])
-        try:
-            self._writer: Any = pq.ParquetWriter(path, self._schema)
-        except OSError as error:
-            raise FleetError(f"{path}: {error.strerror or error}; give a file that can be written") from None
+        self._path, self._unfinished = path, path.with_name(f"{path.name}.unfinished")
+        if path.is_dir():
+            raise FleetError(f"{path} is a folder; give a file that can be written")
+        with _writing(path, _OTHER_FILE):
+            self._writer: Any = pq.ParquetWriter(self._unfinished, self._schema)
 
     def write(self, outcome: Outcome) -> None:
         assert outcome.records is not None
-        count = len(outcome.members)
+        lanes = [(i, m.trial.scans) for i, m in enumerate(outcome.members)]
         columns: dict[str, Any] = {
             "tag": [m.tag for m in outcome.members],
             "card": [m.trial.settings.card.id for m in outcome.members],
             "scan": [m.trial.scan for m in outcome.members],
             **outcome.columns,
-            "output": list(outcome.records[0, :, :count].T),
-            "measurement": list(outcome.records[1, :, :count].T),
+            "output": [outcome.records[0, :scans, i] for i, scans in lanes],
+            "measurement": [outcome.records[1, :scans, i] for i, scans in lanes],
         }
-        self._writer.write_table(self._pa.table(columns, schema=self._schema))
+        with _writing(self._path, _OTHER_FILE):
+            self._writer.write_table(self._pa.table(columns, schema=self._schema))
 
-    def close(self) -> None:
-        self._writer.close()
+    def close(self, *, finished: bool) -> None:
+        with _writing(self._path, _OTHER_FILE):
+            try:
+                self._writer.close()
+                if finished:
+                    os.replace(self._unfinished, self._path)
+            finally:
+                self._unfinished.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _writing(path: Path, remedy: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FleetError(f"{path}: cannot be written: {error.strerror or error}; {remedy}") from None
