@@ -28,6 +28,8 @@ SCANS_PER_TIME: Final = 20
 """By default, at least this many scans in the time in which the loop moves."""
 _PEAKS: Final = 4
 """So many peaks of a sensitivity are looked at."""
+_RESOLUTION: Final = 4e-15
+"""How near a frequency is found, as a share of it: a few units in the last place of its logarithm."""
 
 
 def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = math.nan) -> LoopFigures:
@@ -141,14 +143,35 @@ def settling_time(settings: Settings, process: Process, h: float) -> float:
 
 
 def _crossings(w: Floats, values: Floats, function: Callable[[Floats], Floats], among: npt.ArrayLike = True) -> Floats:
-    """Return where a function is zero, by bisection between values of different signs, in the intervals `among`."""
+    """Return where a function is zero, between values of different signs, in the intervals `among`.
+
+    By Chandrupatla's method on a logarithmic scale: inverse quadratic interpolation where it is safe, else bisection.
+    """
     at = np.flatnonzero(((values[1:] < 0) != (values[:-1] < 0)) & among)
-    a, b, before = w[at], w[at + 1], values[at] < 0
+    x1, x2 = np.log(w[at + 1]), np.log(w[at])
+    f1, f2 = values[at + 1], values[at]
+    share = np.full(at.size, 0.5)
     for _ in range(60 if at.size else 0):
-        middle = np.sqrt(a * b)
-        same = (function(middle) < 0) == before
-        a, b = np.where(same, middle, a), np.where(same, b, middle)
-    return b
+        x = x1 + share * (x2 - x1)
+        f = function(np.exp(x))
+        same = (f < 0) == (f1 < 0)
+        x3, f3 = np.where(same, x1, x2), np.where(same, f1, f2)
+        x2, f2 = np.where(same, x2, x1), np.where(same, f2, f1)
+        x1, f1 = x, f
+        least = _RESOLUTION / np.maximum(np.abs(x2 - x1), _RESOLUTION)
+        if np.all((least >= 0.5) | (f1 == 0)):
+            break
+        share = np.clip(_interpolated(x1, x2, x3, f1, f2, f3), least, 1 - least)
+    return np.exp(np.where(np.abs(f1) < np.abs(f2), x1, x2))
+
+
+def _interpolated(x1: Floats, x2: Floats, x3: Floats, f1: Floats, f2: Floats, f3: Floats) -> Floats:
+    """Return how far from `x1` to `x2` the zero is, by inverse quadratic interpolation where that stays between, else a half."""
+    with np.errstate(all="ignore"):
+        xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+        found = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+        safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(found)
+    return np.where(safe, found, 0.5)
 
 
 def _crossovers(loop: OpenLoop, picture: Picture) -> Floats:
