@@ -107,7 +107,8 @@ def run_block(
         if stop():
             raise Stopped
         part = records[:, at:end] if records is not None else buffer[:, : end - at]  # type: ignore[index]  # one of them is there
-        function(values, states, np.empty((0, end - at, width)), rings, lengths, at, part)
+        with np.errstate(all="ignore"):  # what outgrows all numbers is seen to below
+            function(values, states, np.empty((0, end - at, width)), rings, lengths, at, part)
         part[:, :, :done] = np.nan
         while done < len(ends) and ends[done] == end:
             columns[:, done] = states[places, done]
