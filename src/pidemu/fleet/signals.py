@@ -49,7 +49,7 @@ class SignalStore:
     """
 
     def __init__(self, keep: bool = True, folder: str | Path | None = None, parquet: str | Path | None = None) -> None:
-        self._keep, self._folder = keep, None if folder is None else Path(folder)
+        self._keep, self._folder = keep, None if folder is None else Path(folder).resolve()  # as NumPy names its files
         self._numbers = itertools.count(1)
         self._unfinished: set[Path] = set()
         self._index: list[tuple[object, ...]] = []
