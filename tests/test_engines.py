@@ -1,0 +1,223 @@
+"""Which engine runs what, and why; what was chosen or forced is said, and changes no bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pidemu
+from pidemu import Fleet, Process
+from pidemu.checks.runs import plausible
+from pidemu.engines import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
+from pidemu.errors import EngineError
+from pidemu.loop.trial import trial
+from pidemu.scan.program import Program, Structure
+from pidemu.targets import numba
+from pidemu.targets.python import starting
+from tests.fleet.support import EVERY_ENGINE, alike
+
+PROCESS = Process.from_lags(1.1, [7, 2], delay=1.3)
+
+
+def loop_program() -> Program:
+    made = trial(alike(1)[0].settings, PROCESS, 0.5, time=60)
+    return made.program(made.controller())
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> dict[str, bool]:
+    """What has been compiled or loaded, as the choice is to see it; Numba is imported already."""
+    state = {"loaded": False, "compiled": False}
+
+    def is_compiled(structure: Structure, *, blocks: bool = False) -> bool:
+        return state["compiled"]
+
+    def is_loaded(structure: Structure, *, blocks: bool = False) -> bool:
+        return state["loaded"]
+
+    monkeypatch.setattr(numba, "is_compiled", is_compiled)
+    monkeypatch.setattr(numba, "is_loaded", is_loaded)
+    monkeypatch.setitem(sys.modules, "numba", sys)  # it is asked for its name only
+    return state
+
+
+def test_a_short_record_is_run_in_python_even_where_all_is_compiled(compiled: dict[str, bool]) -> None:
+    compiled |= {"loaded": True, "compiled": True}
+    assert for_record(loop_program(), 20) == Choice("python", "too short to be worth a call into compiled code")
+
+
+@pytest.mark.parametrize(
+    ("loaded", "on_disk", "scans", "engine", "reason"),
+    [
+        (True, True, 5_000, "numba", "compiled already"),
+        (False, True, 2_000, "python", "too short to be worth compiling"),
+        (False, True, 500_000, "numba", "compiled by an earlier run"),
+        (False, False, 50_000, "python", "too short to be worth compiling"),
+        (False, False, 20_000_000, "numba", "long enough to be worth compiling"),
+    ],
+)
+def test_a_record_is_run_by_numba_where_that_pays(
+    loaded: bool, on_disk: bool, scans: int, engine: Engine, reason: str, compiled: dict[str, bool]
+) -> None:
+    compiled |= {"loaded": loaded, "compiled": on_disk}
+    assert for_record(loop_program(), scans) == Choice(engine, reason)
+
+
+def test_importing_numba_counts_where_that_has_not_been_done(compiled: dict[str, bool], monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled |= {"compiled": True}
+    program = loop_program()
+    scans = next(n for n in range(1_000, 10**6, 1_000) if for_record(program, n).engine == "numba")
+    monkeypatch.delitem(sys.modules, "numba")
+    assert for_record(program, scans).engine == "python"
+    assert for_record(program, 20 * scans).engine == "numba"
+
+
+def test_many_loops_are_run_by_numpy_or_numba_and_few_by_python(compiled: dict[str, bool]) -> None:
+    structure = loop_program().structure
+    assert for_loops(structure, 500, 3) == Choice("python", "few loops, too short to be worth compiling")
+    assert for_loops(structure, 500, 300) == Choice("numpy", "many loops, too short to be worth compiling")
+    assert for_loops(structure, 5_000, 10_000) == Choice("numba", "long enough to be worth compiling")
+    compiled |= {"compiled": True}
+    assert for_loops(structure, 5_000, 2_000) == Choice("numba", "compiled by an earlier run")
+    compiled |= {"loaded": True}
+    assert for_loops(structure, 5_000, 1) == Choice("numba", "compiled already")
+
+
+def test_without_numba_loops_are_run_by_numpy_or_python_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    program = loop_program()
+    assert for_record(program, 10**7) == Choice("python", "Numba is not installed")
+    assert for_loops(program.structure, 10**5, 10**4) == Choice("numpy", "many loops, and Numba is not installed")
+    assert for_loops(program.structure, 10**5, 3) == Choice("python", "few loops, and Numba is not installed")
+    result = Fleet(alike(30)).simulate(time=20.0)
+    assert set(result.engines) == {"numpy"}
+    assert pidemu.simulate(alike(1)[0].settings, PROCESS, 0.5, time=20_000).engine == Choice("python", "Numba is not installed")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_is_asked_for_is_taken_whatever_it_costs(engine: Engine) -> None:
+    program = loop_program()
+    assert for_record(program, 1, engine) == Choice(engine, "asked for")
+    assert for_loops(program.structure, 1, 1, engine) == Choice(engine, "asked for")
+    assert str(Choice(engine, "asked for")) == f"{engine} (asked for)"
+
+
+def test_a_name_that_is_no_engine_is_refused_with_those_that_are() -> None:
+    message = r"there is no engine 'nuba' \(did you mean 'numba'\?\); engines: python, numpy, numba, c"
+    settings = alike(1)[0].settings
+    wrong: Any = "nuba"
+    with pytest.raises(EngineError, match=message):
+        checked(wrong)
+    with pytest.raises(EngineError, match=message):
+        pidemu.Controller(settings, engine=wrong)
+    with pytest.raises(EngineError, match=message):
+        pidemu.simulate(settings, PROCESS, 0.5, engine=wrong)
+    with pytest.raises(EngineError, match=message):
+        Fleet(alike(1)).simulate(engine=wrong)
+    assert checked(None) is None
+
+
+def test_an_engine_whose_library_is_missing_is_refused_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    with pytest.raises(EngineError, match=r"the engine 'numba' needs Numba, which is not installed; pip install 'pidemu\[fast\]'"):
+        pidemu.Controller(alike(1)[0].settings, engine="numba")
+    monkeypatch.setattr("shutil.which", lambda *_, **__: None)
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(EngineError, match=r"the engine 'c' needs a C compiler.*install one, or name one in.*CC"):
+        Fleet(alike(1)).simulate(engine="c")
+
+
+def test_a_controller_says_what_ran_its_last_record(compiled: dict[str, bool]) -> None:
+    controller = pidemu.Controller(alike(1)[0].settings, 0.5)
+    assert controller.engine == Choice("python", "nothing has been run")
+    controller.run(50.0, np.full(20, 49.0))
+    assert controller.engine == Choice("python", "too short to be worth a call into compiled code")
+    controller.run(50.0, np.full(5_000, 49.0))
+    assert controller.engine == Choice("python", "too short to be worth compiling")
+    forced = pidemu.Controller(alike(1)[0].settings, 0.5, engine="numpy")
+    assert forced.engine == Choice("numpy", "asked for")
+    forced.run(50.0, [49.0] * 3)
+    assert forced.engine == Choice("numpy", "asked for")
+
+
+def test_a_simulation_says_what_ran_it(compiled: dict[str, bool]) -> None:
+    settings = alike(1)[0].settings
+    assert pidemu.simulate(settings, PROCESS, 0.5, time=10).engine.engine == "python"
+    assert pidemu.simulate(settings, PROCESS, 0.5, time=10, engine="numpy").engine == Choice("numpy", "asked for")
+    away = pidemu.simulate(settings, Process(-1, [5.0]), 0.5, time=400, engine="numpy")
+    assert away.engine == Choice("python", "scan by scan, as the measurement outgrows all numbers")
+
+
+@pytest.mark.parametrize("engine", EVERY_ENGINE)
+@pytest.mark.parametrize("card_id", ["emerson/deltav", "oscat/ft-pid", "toshiba/pid3", "mathworks/pid2", "generic/dahlin"])
+def test_a_closed_loop_has_the_same_bits_in_every_engine(engine: Engine, card_id: str) -> None:
+    settings = plausible(pidemu.load_card(card_id).variant({}))
+    asked: dict[str, Any] = {"time": 300.0, "load": (40.0, 35.0), "initial": (40.0, 40.0, 60.0)}
+    expected = pidemu.simulate(settings, PROCESS, 0.5, **asked, engine="python")
+    found = pidemu.simulate(settings, PROCESS, 0.5, **asked, engine=engine)
+    assert found.engine.engine == engine
+    assert np.array_equal(found.output, expected.output)
+    assert np.array_equal(found.measurement, expected.measurement)
+    assert np.ptp(found.output) > 1
+
+
+@pytest.mark.parametrize("engine", EVERY_ENGINE)
+def test_a_run_goes_on_where_the_last_one_ended_its_delay_lines_too(engine: Engine) -> None:
+    program = loop_program()
+    assert program.lengths == (2,)
+    sp, load = 50 + 10 * np.sin(np.arange(300) / 9), np.where(np.arange(300) > 77, 5.0, 0.0)
+    state, parts = fresh(program), fresh(program)
+    whole = runner(program, engine).run(state, [sp, load], 300)
+    run = runner(program, engine).run
+    cut = [run(parts, [sp[a:b], load[a:b]], b - a) for a, b in ((0, 1), (1, 2), (2, 5), (5, 150), (150, 300))]
+    assert np.array_equal(np.concatenate(cut, axis=1), whole)
+    assert parts == state
+    assert [len(line) for line in parts[len(program.states) :]] == [2]
+    reference = fresh(program)
+    assert np.array_equal(runner(program, "python").run(reference, [sp, load], 300), whole)
+    assert state == reference
+
+
+def fresh(program: Program) -> list[Any]:
+    return [*starting(program), *(deque([0.0] * n) for n in program.lengths)]
+
+
+@pytest.mark.parametrize("engine", EVERY_ENGINE)
+def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(engine: Engine) -> None:
+    program = loop_program()
+    function, most = block(program.structure, engine)
+    width, scans = (most if engine == "numba" else 6), 90
+    lengths = np.array([[1 + 5 * i % 17 for i in range(width)]], dtype=np.int64)
+    values = np.array([[x * (1 + 0.001 * i) for i in range(width)] for x in program.values])
+    sp, load = (base + 5 * np.sin(np.arange(scans)[:, None] / (5 + np.arange(width))) for base in (50, 0))
+    states = np.repeat(np.array(program.initial)[:, None], width, axis=1)
+    rings, found = np.zeros((1, 18, width)), np.empty((2, scans, width))
+    for a, b in ((0, 1), (1, 18), (18, 19), (19, 90)):
+        function(values, states, np.array([sp[a:b], load[a:b]]), rings, lengths, a, found[:, a:b])
+    for i in range(min(width, 20)):
+        alone = replace(program, values=tuple(values[:, i].tolist()), lengths=(int(lengths[0, i]),))
+        state = fresh(alone)
+        assert np.array_equal(found[:, :, i], runner(alone, "python").run(state, [sp[:, i].copy(), load[:, i].copy()], scans))
+        assert states[:, i].tolist() == state[: len(program.states)]
+
+
+def test_a_run_in_python_imports_no_compiler() -> None:
+    code = (
+        "import sys, pidemu\n"
+        "s = pidemu.load_card('generic/standard').settings(K=1, Ti=10, Td=0)\n"
+        "p = pidemu.Process.from_lags(1, [10])\n"
+        "found = pidemu.simulate(s, p, 0.5, time=100)\n"
+        "pidemu.Fleet([pidemu.Loop('a', s, p, 0.5)]).simulate(time=100.0)\n"
+        "assert found.engine.engine == 'python'\n"
+        "print([m for m in ('numba', 'distributed', 'pyarrow', 'scipy', 'matplotlib') if m in sys.modules])"
+    )
+    source = Path(pidemu.__file__).parent.parent
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=source)
+    assert done.stdout.strip() == "[]"
