@@ -57,7 +57,7 @@ class SignalStore:
             with _writing(self._folder, "give a folder that can be made and written"):
                 self._folder.mkdir(parents=True, exist_ok=True)
             if (self._folder / INDEX).exists() or any(self._folder.glob(_BLOCK.format("*"))):
-                raise FleetError(f"{self._folder} holds the signals of a fleet already; give another folder, or empty it")
+                raise FleetError(f"{folder} holds the signals of a fleet already; give another folder, or empty it")
         self._parquet = None if parquet is None else _Parquet(Path(parquet))
 
     def __enter__(self) -> SignalStore:
