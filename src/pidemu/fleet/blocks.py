@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pidemu.engines import Choice
 from pidemu.fleet.prepare import Prepared
-from pidemu.loop.experiment import FIGURES
+from pidemu.loop.experiment import FIGURES, integral_of_error
 from pidemu.loop.simulation import run_trial
 from pidemu.loop.trial import Trial
 from pidemu.targets.runner import Block
@@ -154,10 +154,8 @@ def figures_of(trial: Trial, pv: Floats, out: Floats) -> dict[str, float]:
     start = 0 if trial.load_step is None else trial.first(trial.load_step[0])
     with np.errstate(all="ignore"):
         error = trial.setpoint - pv
-        a, b = error[start:-1], error[start + 1 :]
-        straight = np.where(a * b < 0, (a * a + b * b) / (2 * np.abs(a - b)), np.abs(a + b) / 2)
         return {
-            "iae": float(np.sum(straight) * trial.scan),
+            "iae": integral_of_error(error[start:], trial.scan),
             "peak": float(np.max(np.abs(error[start:]))),
             "travel": float(np.sum(np.abs(np.diff(out, prepend=trial.initial[2])))),
             "at_low": float(np.count_nonzero(out <= trial.limits[0]) * trial.scan),

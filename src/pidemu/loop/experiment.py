@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from pidemu.loop.closed import Parts
 from pidemu.scan.blocks import magnitude
 from pidemu.scan.program import Expr, Name, Program, select
 
+Floats = npt.NDArray[np.float64]
 FIGURES: Final = {"iae": "% s", "peak": "%", "travel": "%", "at_low": "s", "at_high": "s"}
 """The states that hold what is measured, with their units.
 
@@ -89,6 +93,22 @@ def experiment(program: Program, steps: Steps, measuring: Measuring | None = Non
         _outputs(p, Name(program.output), measuring, h)
     p.then(n.id, n + 1.0, "scans so far", "-")
     return p.added(replace(program, inputs=()))
+
+
+def integral_of_error(error: Floats, scan: float) -> float:
+    """Return the integral of the absolute error along straight lines between the scans, from signals [% s].
+
+    Parameters
+    ----------
+    error : ndarray, shape (scans,)
+        The error at the scans [%].
+    scan : float
+        Scan interval [s].
+    """
+    a, b = error[:-1], error[1:]
+    crosses = a * b < 0
+    apart = np.where(crosses, np.abs(a - b), 1.0)
+    return float(np.sum(np.where(crosses, (a * a + b * b) / (2 * apart), np.abs(a + b) / 2)) * scan)
 
 
 def _errors(p: Parts, error: Expr, start: int, h: Name) -> None:

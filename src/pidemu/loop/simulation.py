@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pidemu.certificate.models import LoopComparison, LoopFigures
 from pidemu.emulator import Controller
 from pidemu.engines import Choice, Engine, checked, for_record, runner
+from pidemu.loop.experiment import integral_of_error
 from pidemu.loop.figures import loop_figures
 from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
@@ -70,10 +71,7 @@ class Simulation:
     def iae(self) -> float:
         """Integral of the absolute error [% s], along straight lines between scans: from the load step or from the start."""
         start = 0 if self.load_step is None else int(np.searchsorted(self.times, self.load_step[0] * (1 - 1e-12)))
-        a, b = self.error[start:-1], self.error[start + 1 :]
-        crosses = a * b < 0
-        apart = np.where(crosses, np.abs(a - b), 1.0)
-        return float(np.sum(np.where(crosses, (a * a + b * b) / (2 * apart), np.abs(a + b) / 2)) * self.scan)
+        return integral_of_error(self.error[start:], self.scan)
 
 
 def simulate(
