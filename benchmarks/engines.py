@@ -273,9 +273,7 @@ def main() -> None:
     parser.add_argument("--no-cluster", action="store_true", help="leave Dask out, which takes minutes")
     given = parser.parse_args()
     less = 10 if given.quick else 1
-    print(
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f} before; last in a line: its ratio to the line with 1.00"
-    )
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f} before; last in a line: its ratio to the line with 1.00")
     one_loop(10**6 // less, 2 * 10**5 // less, 9)
     fleet(10**4 // less, 1000, 9)
     lengths(5, given.quick)
