@@ -126,7 +126,7 @@ def simple_pid_step() -> Callable[[float, float], float]:
 
     def step(r: float, y: float) -> float:
         pid.setpoint = r
-        return float(pid(y, dt=H))
+        return pid(y, dt=H) or 0.0
 
     return step
 

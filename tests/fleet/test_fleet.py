@@ -85,6 +85,15 @@ def test_nor_do_the_ends_of_blocks_of_batches_and_of_stretches_in_time(engine: E
     check_figures(result, expected, [loop.initial[2] for loop in loops])
 
 
+def test_the_error_counts_from_the_scan_of_the_load_step_on_or_from_the_first() -> None:
+    at_once = [replace(loop, process=Process.from_lags(1, [4.0 + i])) for i, loop in enumerate(alike(3))]  # no dead time
+    for steps in ({"setpoint": (0.0, 10.0), "load": 0.0}, {"setpoint": (10.0, 10.0), "load": (10.0, 1.0)}):
+        expected = [alone(loop, **steps, time=30.0) for loop in at_once]
+        result = Fleet(at_once).simulate(**steps, time=30.0)
+        assert result.columns["peak"].tolist() == [10.0] * 3  # in that very scan; the next ones have less
+        check_figures(result, expected, [50.0] * 3)
+
+
 def test_loops_of_unlike_length_share_a_block_up_to_twice_the_scans() -> None:
     loops = [replace(loop, time=float(seconds)) for loop, seconds in zip(alike(6), (90, 10, 20, 21, 11, 50), strict=True)]
     ready = [one for one in prepare.prepared(enumerate(loops), Plan(), {}) if isinstance(one, prepare.Prepared)]
@@ -296,3 +305,14 @@ def test_what_is_in_memory_does_not_grow_with_blocks_that_nobody_has_taken(monke
         time.sleep(0.02)
         assert len(made) <= taken + 4  # two for each core
     assert taken == len(made) == 10
+
+
+def test_blocks_that_wait_until_others_are_taken_stop_too() -> None:
+    found = local.outcomes(enumerate(alike(1280, time=5.0)), Plan(keep=True, engine="python"), cores=2, room=np.empty)
+    next(found)
+    time.sleep(0.5)  # all that may be ahead is done, and the threads wait
+    closing = threading.Thread(target=found.close, daemon=True)
+    closing.start()
+    closing.join(10)
+    assert not closing.is_alive()
+    assert not any(t.name.startswith("fleet") for t in threading.enumerate())

@@ -239,3 +239,11 @@ def test_without_pyarrow_the_remedy_is_named_and_nothing_is_run(tmp_path: Path, 
 def test_a_store_keeps_in_memory_what_it_is_asked_to() -> None:
     with SignalStore() as store:
         assert store.room((2, 3, 4)).shape == (2, 3, 4)
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="room cannot be reserved there")
+def test_the_room_of_a_block_is_reserved_before_it_is_run(tmp_path: Path) -> None:
+    with SignalStore(folder=tmp_path) as store:
+        records = store.room((2, 1000, 64))
+        (path,) = tmp_path.glob("*.npy")
+        assert path.stat().st_blocks * 512 >= records.nbytes  # a full disk is met here, not while a thread writes
