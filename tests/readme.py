@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 from pathlib import Path
@@ -30,7 +31,7 @@ def printed_by(command: str, folder: Path) -> str:
     words = [w.replace("emulated.csv", str(folder / "emulated.csv")) for w in shlex.split(command)]
     words = [str(ROOT / w) if w.startswith("examples/") else w for w in words]
     result = CliRunner().invoke(cli, words)
-    return result.output
+    return result.output.replace(f"{ROOT}{os.sep}", "")  # as in a clone's own folder
 
 
 def python_block(text: str) -> str:

@@ -171,7 +171,8 @@ def run_trial(made: Trial, forced: Engine | None = None) -> tuple[Floats, Floats
     controller, sp, load = made.controller(), made.setpoint, made.load
     program = made.program(controller)
     choice = for_record(program, made.scans, forced)
-    state = [*starting(program), *(deque([0.0] * length) for length in program.lengths)]
+    under_way = (min(length, made.scans) for length in program.lengths)  # what comes later is not seen
+    state = [*starting(program), *(deque([0.0] * length) for length in under_way)]
     with np.errstate(all="ignore"):
         out, pv = runner(program, choice.engine).run(state, [sp, load], made.scans)
     if not (np.isfinite(pv).all() and np.isfinite(out).all()):  # what a card does then is the emulator's to know
