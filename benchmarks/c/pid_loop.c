@@ -22,7 +22,7 @@ void run_one(const pid_loop_settings *settings, pid_loop_state *state, size_t n,
         const double dI = s.ki_h * e;
         const double grown = integral + dI;
         const double wanted = P + grown + derivative;
-        if (!(((wanted > s.high) & (dI > 0.0)) | ((wanted < s.low) & (dI < 0.0))))
+        if (!((wanted > s.high && dI > 0.0) || (wanted < s.low && dI < 0.0)))
             integral = grown;
         const double v = P + integral + derivative;
         const double out = v > s.high ? s.high : v < s.low ? s.low : v;
