@@ -126,12 +126,16 @@ class Controller:
 
     def _running_with(self, settings: Settings) -> Running:
         """Return the program of settings, at its start."""
+        made: dict[float, Program] = {}
 
         def make(h: float, *, at_rest: bool = False) -> Program:
             a = settings.algorithm(own_units=True, scan=h)
+            resting_a = resting(a) if at_rest else a
+            if resting_a is a and h in made:
+                return made[h]
             alone = not (a.ki or a.velocity or a.dahlin)
-            return build(
-                resting(a) if at_rest else a,
+            program = build(
+                resting_a,
                 h,
                 action=self._action,
                 limits=self._limits,
@@ -140,6 +144,9 @@ class Controller:
                 signals=self._signals,
                 title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
             )
+            if resting_a is a and h == self.interval:
+                made[h] = program
+            return program
 
         return Running(make, self.interval)
 

@@ -30,6 +30,8 @@ class Running:
         From a scan interval [s] to the program; with ``at_rest=True`` to one whose first scan moves nothing.
     interval : float
         Nominal scan interval [s].
+    like : Running, optional
+        One whose functions can serve where the program is the same.
 
     Attributes
     ----------
@@ -41,10 +43,11 @@ class Running:
         Its states, in its order and precision; this list is changed in place.
     """
 
-    def __init__(self, make: Callable[..., Program], interval: float) -> None:
+    def __init__(self, make: Callable[..., Program], interval: float, like: Running | None = None) -> None:
         self.interval = interval
         self.program = make(interval)
-        self.compiled: Compiled = compiled(self.program)
+        same = like is not None and like.program is self.program
+        self.compiled: Compiled = like.compiled if like is not None and same else compiled(self.program)
         self.state: list[float] = list(self.compiled.initial)
         self._make = make
         self._places = {q.name: i for i, q in enumerate(self.program.states)}
@@ -134,7 +137,7 @@ class Running:
             self[name] = old[name]
         if not last or not new:
             return
-        other = Running(lambda h: self._make(h, at_rest=True), self.interval)
+        other = Running(lambda h: self._make(h, at_rest=True), self.interval, self)
         rest = _resting(other, self._by_hand(last, old["u"]))
         rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
         for name in new:
@@ -175,17 +178,21 @@ def _resting(other: Running, by_hand: Mapping[str, float]) -> dict[str, float]:
     return other.named()
 
 
+_AT_REST: Final[Mapping[str, object]] = {
+    "start": "bumpless",
+    "first_scan_holds": False,
+    "zero_power_up": False,
+    "zero_first_output": False,
+    "derivative_start": "running",
+    "derivative_from_zero": False,
+    "integral_from_zero": False,
+    "sp_from_zero": False,
+    "manual_output": "operator",
+}
+
+
 def resting(a: Algorithm) -> Algorithm:
-    """Return the algorithm with a first scan that moves nothing and a transfer that does not bump."""
-    return replace(
-        a,
-        start="bumpless",
-        first_scan_holds=False,
-        zero_power_up=False,
-        zero_first_output=False,
-        derivative_start="running",
-        derivative_from_zero=False,
-        integral_from_zero=False,
-        sp_from_zero=False,
-        manual_output="operator",
-    )
+    """Return the algorithm with a first scan that moves nothing and a transfer that does not bump; itself where it is so."""
+    if all(getattr(a, name) == value for name, value in _AT_REST.items()):
+        return a
+    return replace(a, **_AT_REST)  # type: ignore[arg-type]
