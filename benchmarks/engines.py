@@ -86,6 +86,8 @@ def one_loop(scans: int, slow: int, rounds: int) -> None:
 
     jobs: dict[str, Job] = {"C by hand": by_hand}  # its arrays are made anew each time, as the others' are
     u, y = by_hand()
+    kept = np.empty((2, scans))
+    jobs["C by hand, into arrays that are there"] = lambda: run_one(c, Numbers(), sp, load, *kept)
     engines: dict[str, Engine] = {"C generated": "c", "numba": "numba", "python": "python"}
     for name, engine in engines.items():
         run = runner(p, engine).run
