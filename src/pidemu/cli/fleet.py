@@ -25,13 +25,12 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.fleet.fleet import Fleet
-from pidemu.fleet.result import FleetResult
+from pidemu.fleet.result import RAN, FleetResult
 from pidemu.fleet.table import LoopTable, read_loops
 from pidemu.plain import json_safe
 
 _ROWS: Final = 20
 """Loops that are shown; a plant has thousands."""
-_RAN: Final = ("done", "ran away")
 _COLUMNS: Final = ("tag", "card", "scan", "IAE [% s]", "peak [%]", "travel [%]", "at limits [s]", "error [%]")
 
 
@@ -110,7 +109,7 @@ def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
         for message in (*notes, *([reason] if reason else [])):
             click.echo(loops.located(line, loop.tag, message), err=True)
     if result.interrupted:
-        done = sum(result.counts[status] for status in _RAN)
+        done = sum(result.counts[status] for status in RAN)
         click.echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
 
 
@@ -134,12 +133,12 @@ def _engines(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 
 def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool) -> None:
     counts = Counter(row["status"] for row in rows)
-    said = ", ".join(f"{counts[status]:,} {status}" for status in (*_RAN, "failed", "not run") if counts[status])
+    said = ", ".join(f"{counts[status]:,} {status}" for status in (*RAN, "failed", "not run") if counts[status])
     heading(f"{loops.path}: {_loops(len(rows))}, {said}")
     if engines:
         used = ", ".join(f"{name} ({_loops(count)})" for name, count in _engines(rows).items())
         click.echo(f"engine: {used or 'none, as nothing was run'}")
-    ran = [row for row in rows if row["status"] in _RAN]
+    ran = [row for row in rows if row["status"] in RAN]
     if ran:
         heading(f"\nThe {_ROWS} loops with the largest IAE" if len(ran) > _ROWS else "\nLoops, the largest IAE first")
         worst = sorted(ran, key=_badness, reverse=True)[:_ROWS]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,10 +15,13 @@ from pidemu.errors import FleetError, suggest
 from pidemu.fleet.blocks import COLUMNS, Outcome
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
+from pidemu.fleet.writing import write_rows
 from pidemu.loop.trial import Trial
 
 Floats = npt.NDArray[np.float64]
 Status = Literal["done", "ran away", "failed", "not run"]
+RAN: Final[tuple[Status, ...]] = ("done", "ran away")
+"""What the status of a loop that ran may be."""
 HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "engine", "reason")
 """Columns of the table. Times are in seconds, signals in percent."""
 
@@ -122,7 +124,7 @@ class FleetResult:
         if place is None:
             raise FleetError(f"there is no loop '{tag}'{suggest(tag, self._places)} in the fleet")
         if place not in self._signals:
-            done = self.status[place] in ("done", "ran away")
+            done = self.status[place] in RAN
             raise FleetError(
                 f"the signals of loop '{tag}' were not kept; run the fleet with keep=True"
                 if done
@@ -136,7 +138,7 @@ class FleetResult:
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""
         for i, loop in enumerate(self.loops):
-            ran = self.status[i] in ("done", "ran away")
+            ran = self.status[i] in RAN
             figures = {name: float(column[i]) if ran else None for name, column in self.columns.items()}
             yield {
                 "tag": loop.tag,
@@ -162,10 +164,4 @@ class FleetResult:
         FleetError
             The file cannot be written.
         """
-        try:
-            with open(path, "w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, HEADER)
-                writer.writeheader()
-                writer.writerows(self.rows())
-        except OSError as error:
-            raise FleetError(f"{path}: cannot be written: {error.strerror or error}; give a file that can") from None
+        write_rows(path, HEADER, self.rows())

@@ -6,7 +6,6 @@ import contextlib
 import csv
 import itertools
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.writing import writing
 
 Floats = npt.NDArray[np.float64]
 INDEX: Final = "signals.csv"
@@ -54,7 +54,7 @@ class SignalStore:
         self._unfinished: set[Path] = set()
         self._index: list[tuple[object, ...]] = []
         if self._folder is not None:
-            with _writing(self._folder, "give a folder that can be made and written"):
+            with writing(self._folder, "give a folder that can be made and written"):
                 self._folder.mkdir(parents=True, exist_ok=True)
             if (self._folder / INDEX).exists() or any(self._folder.glob(_BLOCK.format("*"))):
                 raise FleetError(f"{folder} holds the signals of a fleet already; give another folder, or empty it")
@@ -75,7 +75,7 @@ class SignalStore:
             return np.empty(shape)
         path = self._folder / _BLOCK.format(f"{next(self._numbers):05d}")
         self._unfinished.add(path)
-        with _writing(path, "give a folder that can be written, with enough room"):
+        with writing(path, "give a folder that can be written, with enough room"):
             found: Floats = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=shape)
             if hasattr(os, "posix_fallocate"):  # what there is no room for is refused here, and does not end the process later
                 with path.open("r+b") as file:
@@ -102,7 +102,7 @@ class SignalStore:
             records = here
         assert isinstance(records, np.memmap)
         path = Path(str(records.filename))
-        with _writing(path, "give a folder that can be written, with enough room"):
+        with writing(path, "give a folder that can be written, with enough room"):
             records.flush()
         self._index += [(m.tag, path.name, i, m.trial.scan, m.trial.scans) for i, m in enumerate(outcome.members)]
         self._unfinished.discard(path)
@@ -115,7 +115,7 @@ class SignalStore:
                     path.unlink()
             if self._index or kind is None:
                 index = self._folder / INDEX
-                with _writing(index, "give a folder that can be written"), index.open("w", newline="", encoding="utf-8") as file:
+                with writing(index, "give a folder that can be written"), index.open("w", newline="", encoding="utf-8") as file:
                     csv.writer(file).writerows([_INDEX_HEADER, *self._index])
         if self._parquet is not None:
             self._parquet.close(finished=kind is None)
@@ -139,7 +139,7 @@ class _Parquet:
         self._path, self._unfinished = path, path.with_name(f"{path.name}.unfinished")
         if path.is_dir():
             raise FleetError(f"{path} is a folder; give a file that can be written")
-        with _writing(path, _OTHER_FILE):
+        with writing(path, _OTHER_FILE):
             self._writer: Any = pq.ParquetWriter(self._unfinished, self._schema)
 
     def write(self, outcome: Outcome) -> None:
@@ -153,22 +153,14 @@ class _Parquet:
             "output": [outcome.records[0, :scans, i] for i, scans in lanes],
             "measurement": [outcome.records[1, :scans, i] for i, scans in lanes],
         }
-        with _writing(self._path, _OTHER_FILE):
+        with writing(self._path, _OTHER_FILE):
             self._writer.write_table(self._pa.table(columns, schema=self._schema))
 
     def close(self, *, finished: bool) -> None:
-        with _writing(self._path, _OTHER_FILE):
+        with writing(self._path, _OTHER_FILE):
             try:
                 self._writer.close()
                 if finished:
                     os.replace(self._unfinished, self._path)
             finally:
                 self._unfinished.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def _writing(path: Path, remedy: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise FleetError(f"{path}: cannot be written: {error.strerror or error}; {remedy}") from None

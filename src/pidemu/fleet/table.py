@@ -12,6 +12,7 @@ from pidemu.card.library import folders, load_card
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.result import HEADER, FleetResult
+from pidemu.fleet.writing import write_rows
 from pidemu.loop.process import parse_process
 from pidemu.scan.build import Action
 from pidemu.words import assignments, pair, seconds, step
@@ -100,13 +101,7 @@ class LoopTable:
         FleetError
             The file cannot be written.
         """
-        try:
-            with Path(path).open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, HEADER, extrasaction="ignore")
-                writer.writeheader()
-                writer.writerows(self.rows(result))
-        except OSError as error:
-            raise FleetError(f"{path}: cannot be written: {error.strerror}; give a file that can") from None
+        write_rows(path, HEADER, self.rows(result))
 
 
 def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
