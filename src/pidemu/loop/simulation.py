@@ -16,7 +16,7 @@ from pidemu.loop.figures import loop_figures
 from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
 from pidemu.loop.process import Process
-from pidemu.loop.trial import Step, Trial, trial
+from pidemu.loop.trial import Step, Trial, first_scan, trial
 from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
@@ -70,7 +70,7 @@ class Simulation:
     @property
     def iae(self) -> float:
         """Integral of the absolute error [% s], along straight lines between scans: from the load step or from the start."""
-        start = 0 if self.load_step is None else int(np.searchsorted(self.times, self.load_step[0] * (1 - 1e-12)))
+        start = 0 if self.load_step is None else first_scan(self.load_step[0], self.scan, self.times.size)
         return integral_of_error(self.error[start:], self.scan)
 
 

@@ -84,7 +84,7 @@ class Trial:
 
     def first(self, at: float) -> int:
         """Return the first scan at or after a time [s]."""
-        return int(np.searchsorted(self.times, at * (1 - 1e-12)))
+        return first_scan(at, self.scan, self.scans)
 
     def _signal(self, step: Step | None) -> Floats:
         if step is None:
@@ -112,6 +112,25 @@ class Trial:
         pv_span, output_span = Scale(self.settings).spans
         rest = (self.initial[1], self.initial[2])
         return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, pv_span, output_span)
+
+
+def first_scan(at: float, scan: float, scans: int) -> int:
+    """Return the first scan at or after a time [s], of so many; their number where there is none.
+
+    Parameters
+    ----------
+    at : float
+        The time [s]; a scan that rounding puts just before it counts.
+    scan : float
+        Scan interval [s]; scan `n` is at ``n scan``.
+    scans : int
+        How many scans.
+    """
+    least = at * (1 - 1e-12)
+    n = min(max(0, math.ceil(least / scan) - 1), scans)
+    while n < scans and n * scan < least:
+        n += 1
+    return n
 
 
 def trial(
