@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -18,8 +17,9 @@ from pidemu.checks.runs import plausible
 from pidemu.engines import ENGINES, Engine
 from pidemu.errors import PidemuError
 from pidemu.loop.trial import trial
+from pidemu.targets import native
 
-COMPILER: Final = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler on this machine")
+COMPILER: Final = pytest.mark.skipif(not native.available(), reason="no C compiler on this machine")
 EVERY_ENGINE: Final = [pytest.param(e, marks=COMPILER) if e == "c" else e for e in ENGINES]
 PROCESSES: Final = (
     Process.from_lags(1.2, [8], delay=2.3),

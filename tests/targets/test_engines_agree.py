@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import zlib
 from typing import Any
 
@@ -15,11 +14,12 @@ from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible
 from pidemu.engines import ENGINES, Engine, block, has_numba
 from pidemu.settings import Settings
+from pidemu.targets import native
 from pidemu.targets.python import compiled, starting
 
 Floats = npt.NDArray[np.float64]
 CARDS = [pytest.param(card_id, id=card_id) for card_id in card_files()]
-COMPILER = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler on this machine")
+COMPILER = pytest.mark.skipif(not native.available(), reason="no C compiler on this machine")
 NUMBA = pytest.mark.skipif(not has_numba(), reason="there is no Numba for this machine")
 OTHERS = [pytest.param(e, marks={"c": COMPILER, "numba": NUMBA}.get(e, ())) for e in ENGINES if e != "python"]
 SCANS = 600

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import threading
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 
 import pidemu
 from pidemu.engines import ENGINES, Engine, has_numba
+from pidemu.targets import native
 
 SMALLEST = 5e-324
 
@@ -24,7 +24,7 @@ def denormal_numbers_are_kept() -> bool:
 def test_an_engine_leaves_denormal_numbers_and_error_handling_alone(engine: Engine) -> None:
     if engine == "numba" and not has_numba():
         pytest.skip("there is no Numba for this machine")
-    if engine == "c" and not any(map(shutil.which, ("cc", "gcc", "clang"))):
+    if engine == "c" and not native.available():
         pytest.skip("no C compiler on this machine")
     before = np.geterr()
     card, process = pidemu.load_card("generic/standard"), pidemu.Process.from_lags(1.0, lags=[10, 2], delay=1)
