@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.algorithm import Algorithm
 from pidemu.canonical import default_scan
 from pidemu.card.stages import Faults
 from pidemu.doubtful import bad_signal, usable_interval
 from pidemu.engines import Choice, Engine, checked, for_record
 from pidemu.errors import PidemuError, ScanError, suggest
-from pidemu.running import Running, resting
+from pidemu.running import Running
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
@@ -126,16 +127,11 @@ class Controller:
 
     def _running_with(self, settings: Settings) -> Running:
         """Return the program of settings, at its start."""
-        made: dict[float, Program] = {}
 
-        def make(h: float, *, at_rest: bool = False) -> Program:
-            a = settings.algorithm(own_units=True, scan=h)
-            resting_a = resting(a) if at_rest else a
-            if resting_a is a and h in made:
-                return made[h]
+        def built(a: Algorithm, h: float) -> Program:
             alone = not (a.ki or a.velocity or a.dahlin)
-            program = build(
-                resting_a,
+            return build(
+                a,
                 h,
                 action=self._action,
                 limits=self._limits,
@@ -144,11 +140,8 @@ class Controller:
                 signals=self._signals,
                 title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
             )
-            if resting_a is a and h == self.interval:
-                made[h] = program
-            return program
 
-        return Running(make, self.interval)
+        return Running(lambda h: settings.algorithm(own_units=True, scan=h), built, self.interval)
 
     def _know_the_everyday_scan(self) -> None:
         """Keep in mind whether a scan without anything special goes straight to the program."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import replace
 from math import isnan, nan
 from typing import Any, Final
@@ -26,12 +27,12 @@ class Running:
 
     Parameters
     ----------
-    make : callable
-        From a scan interval [s] to the program; with ``at_rest=True`` to one whose first scan moves nothing.
+    algorithm : callable
+        From a scan interval [s] to the algorithm.
+    built : callable
+        From an algorithm and a scan interval [s] to the program.
     interval : float
         Nominal scan interval [s].
-    like : Running, optional
-        One whose functions can serve where the program is the same.
 
     Attributes
     ----------
@@ -43,13 +44,14 @@ class Running:
         Its states, in its order and precision; this list is changed in place.
     """
 
-    def __init__(self, make: Callable[..., Program], interval: float, like: Running | None = None) -> None:
+    def __init__(
+        self, algorithm: Callable[[float], Algorithm], built: Callable[[Algorithm, float], Program], interval: float
+    ) -> None:
         self.interval = interval
-        self.program = make(interval)
-        same = like is not None and like.program is self.program
-        self.compiled: Compiled = like.compiled if like is not None and same else compiled(self.program)
+        self.program = built(algorithm(interval), interval)
+        self.compiled: Compiled = compiled(self.program)
         self.state: list[float] = list(self.compiled.initial)
-        self._make = make
+        self._algorithm, self._built = algorithm, built
         self._places = {q.name: i for i, q in enumerate(self.program.states)}
         self._others: dict[float, Compiled] = {}
         self._runners: dict[Engine, Runner] = {}
@@ -68,7 +70,7 @@ class Running:
         if found is None:
             if len(self._others) >= _REMEMBERED:
                 self._others.clear()
-            program = self._make(h)
+            program = self._built(self._algorithm(h), h)
             if [q.name for q in program.states] != list(self._places):
                 raise ScanError(
                     f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
@@ -137,7 +139,7 @@ class Running:
             self[name] = old[name]
         if not last or not new:
             return
-        other = Running(lambda h: self._make(h, at_rest=True), self.interval, self)
+        other = self._before_a_scan_that_moves_nothing()
         rest = _resting(other, self._by_hand(last, old["u"]))
         rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
         for name in new:
@@ -145,6 +147,16 @@ class Running:
         if "I" in new:
             other.reset()
             self["I"] = self._left_for_the_integral(other, last, old["u"])
+
+    def _before_a_scan_that_moves_nothing(self) -> Running:
+        """Return this controller before the first scan, and that one such that it moves nothing."""
+        a = self._algorithm(self.interval)
+        still = resting(a)
+        if still is not a:
+            return Running(lambda _h: still, self._built, self.interval)
+        other = copy(self)
+        other.state = list(self.compiled.initial)
+        return other
 
     def _by_hand(self, last: Mapping[str, float], u: float) -> dict[str, float]:
         return {**last, "auto": 0.0, "manual": u, "track": nan}

@@ -131,7 +131,7 @@ def factors(a: Algorithm, ctl: Controller) -> tuple[float, float]:
 
 def term(ctl: Controller, bench: Bench, sp: float) -> float:
     """Return what the program will compute as proportional term in its next scan, before a gain on the whole sum."""
-    running = Running(lambda _h: ctl.program, ctl.interval)
+    running = Running(lambda _h: bench.a, lambda _a, _h: ctl.program, ctl.interval)
     if not running.computes("P"):
         return 0.0
     for name, value in ctl.state.items():

@@ -16,9 +16,8 @@ from pidemu.loop.figures import loop_figures, scan_for, time_scale
 from pidemu.loop.hold import Plant
 from pidemu.loop.open_loop import OpenLoop
 from pidemu.loop.process import Process
-from pidemu.running import Running, resting
+from pidemu.running import Running
 from pidemu.scan.build import build
-from pidemu.scan.program import Program
 from pidemu.settings import Settings
 
 _WIDE: Final = (-1e12, 1e12)
@@ -123,12 +122,8 @@ def _tail(before: float, after: float) -> float:
 
 def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Iterator[float]:
     """Yield the integral of the absolute error per block of scans, after a load step of 1 % from rest [% s]."""
-    a = algorithm.linear
-
-    def make(h: float, *, at_rest: bool = False) -> Program:
-        return build(resting(a) if at_rest else a, h, limits=_WIDE)
-
-    running = Running(make, h)
+    linear = algorithm.linear
+    running = Running(lambda _h: linear, lambda a, h: build(a, h, limits=_WIDE), h)
     running.take_over({"u": 0.0}, {"sp": 0.0, "pv": 0.0, "auto": 1.0, "manual": nan})
     scan, state, plant = running.compiled.scan, running.state, Plant(process.sampled(h))
     last = 0.0
