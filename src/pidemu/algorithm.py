@@ -322,6 +322,30 @@ class Algorithm:
             found.append(f"the integral time of {abs(self.kp / self.ki):.3g} s is less")
         return found
 
+    def paced(self, pace: float) -> Algorithm:
+        """Return the algorithm as it works when every scan comes after `pace` times the interval that it computes with.
+
+        What happens per scan stays, so all its times become longer by that factor (specs/equations.md, section 3).
+        """
+        if pace == 1:
+            return self
+        lags = {
+            name: lag if lag is None or lag.factor != 1 else replace(lag, time=lag.time * pace)  # a share per scan is one anyway
+            for name, lag in (("sp_filter", self.sp_filter), ("pv_filter", self.pv_filter), ("e_filter", self.e_filter))
+        }
+        return replace(
+            self,
+            ki=self.ki / pace,
+            kd=self.kd * pace,
+            Tf=self.Tf * pace,
+            tracking_time=self.tracking_time * pace,
+            sp_rate=self.sp_rate / pace,
+            output_rate=self.output_rate / pace,
+            sp_filter=lags["sp_filter"],
+            pv_filter=lags["pv_filter"],
+            e_filter=lags["e_filter"],
+        )
+
     @property
     def linear(self) -> Algorithm:
         """The algorithm without what the linear law leaves out."""

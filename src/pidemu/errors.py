@@ -14,6 +14,7 @@
     ├── RecordError          a recorded signal file cannot be used
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
+        └── QuestionError         what was given can mean several things, and the result depends on which; holds the questions
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pidemu.conversion.questions import Question
     from pidemu.conversion.result import Conversion
 
 
@@ -140,6 +142,20 @@ class ConversionRefusedError(PidemuError):
     def __init__(self, message: str, nearest: Conversion | None = None) -> None:
         super().__init__(message)
         self.nearest = nearest
+
+
+class QuestionError(ConversionRefusedError):
+    """What was given can mean several things, and the result depends on which.
+
+    Attributes
+    ----------
+    questions : tuple of Question
+        What to answer, each with its readings, what they would give, and their commands.
+    """
+
+    def __init__(self, questions: Iterable[Question]) -> None:
+        self.questions = tuple(questions)
+        super().__init__("\n".join(q.text for q in self.questions))
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

@@ -15,6 +15,7 @@ from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.settings import RESERVED, Settings, Value, limits, off_values, spans_of
 from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
 
+_RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
 
 
@@ -117,9 +118,19 @@ def _read(
             return None
         raise SettingError(f"missing; it {_purpose(setting)}, in {unit.name}")
     number, written, note = _number(given, setting, unit, spans, form, ranged)
-    value = Value(name, setting, number, unit.name, spans, active=active, note=note)
+    typed = given if isinstance(given, str | float) else number
+    unclear = note != "" and isinstance(given, str) and _counts_the_other_way(given, setting, unit, form)
+    value = Value(name, setting, number, unit.name, spans, active=active, note=note, typed=typed, unclear=unclear)
     _check(value, given if written else None)
     return value
+
+
+def _counts_the_other_way(given: str, setting: Setting, unit: Unit, form: Form) -> bool:
+    """Whether a time without "per" was written for an integral dial that counts repeats per time."""
+    if Role(setting.sets) is not Role.INTEGRAL or form is Form.PARALLEL:
+        return False
+    written = parse_quantity(given)[1] if given.strip().casefold() != "off" else None
+    return written is not None and written.dimension is Dimension.TIME and unit.dimension in _RATES
 
 
 def _purpose(setting: Setting) -> str:

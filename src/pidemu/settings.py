@@ -41,6 +41,10 @@ class Value:
         Whether the chosen options use it.
     note : str
         How what was given became `value`; empty if it was given so.
+    typed : str or float or None
+        What the user gave, with its unit where one was written; ``None`` where nothing was, or where the value is another since.
+    unclear : bool
+        Whether what was given can be read in two ways: a time for a dial that counts repeats per time.
     """
 
     name: str
@@ -51,6 +55,8 @@ class Value:
     given: bool = True
     active: bool = True
     note: str = ""
+    typed: str | float | None = None
+    unclear: bool = False
 
     @property
     def role(self) -> Role:
@@ -115,7 +121,10 @@ class Settings(Mapping[str, Value]):
     notes : tuple of str
         What was inferred or converted on the way in.
     defaulted : tuple of str
-        Options that nobody chose, so that the card's default was taken.
+        Options that were not stated, so that the card's default was taken.
+    pace : float
+        Interval at which the algorithm is really executed per the interval it computes with. All its times are this much longer:
+        integral and derivative time, filters, ramps; the gain stays (specs/equations.md, section 3).
     """
 
     variant: Variant
@@ -124,6 +133,7 @@ class Settings(Mapping[str, Value]):
     op_range: tuple[float, float] | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
+    pace: float = 1.0
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
@@ -200,7 +210,9 @@ class Settings(Mapping[str, Value]):
             A setting is unknown or out of range.
         """
         new = {name.casefold() for name in values}
-        given: dict[str, object] = {n: v.value for n, v in self.items() if v.given and n.casefold() not in new}
+        given: dict[str, object] = {
+            n: v.value if v.typed is None else v.typed for n, v in self.items() if v.given and n.casefold() not in new
+        }
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
@@ -228,7 +240,7 @@ class Settings(Mapping[str, Value]):
         filtered = (equation.setpoint, equation.measurement, equation.error) != (None, None, None)
         key = (own_units and equation.signals == "engineering", scan if filtered else None)  # what makes a difference
         if key not in self._algorithms:
-            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan)
+            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan).paced(self.pace)
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:

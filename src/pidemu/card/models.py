@@ -151,6 +151,11 @@ class CardFile(Equation):
     vendor: Text = Field(description="Maker, or the community that keeps the program.")
     product: Text = Field(description="Product line.")
     algorithm: Text = Field(description="The algorithm within the product.")
+    kind: Literal["product", "software", "equation"] = Field(
+        default="product",
+        description="`product`: what is not stated of a loop was set at the site, and is asked for where it matters. `software`: what is "
+        "not given runs with its documented default. `equation`: a textbook's, which takes the signals of the other side.",
+    )
     about: Text | None = Field(default=None, description="What a reader should know first, in a few sentences.")
     sources: dict[Text, Source] = Field(description="What the card rests on, by a short key.")
     options: dict[SettingName, Option] = Field(default={}, description="What the vendor lets you choose per loop.")

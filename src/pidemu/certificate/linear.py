@@ -115,14 +115,9 @@ def _compared(source: Law, target: Law, path: PathName, band: tuple[float, float
     return compare(lambda w: factor * source.held(w, path), lambda w: target.held(w, path), *band)
 
 
-def deviation(source: Law, target: Law, band: tuple[float, float], factor: float) -> float:
-    """Return the largest relative deviation of the feedback paths over one band; arguments as in `compare_paths`."""
-    return _compared(source, target, "feedback", band, factor).max_deviation
-
-
-def scan_phase(w: float, scans: tuple[float, float]) -> float:
-    """Return the phase that a hold of the target's interval loses against one of the source's at `w` [rad/s], in degrees."""
-    return math.degrees(w * (scans[1] - scans[0]) / 2)
+def deviation(source: Law, target: Law, band: tuple[float, float], factor: float, path: PathName = "feedback") -> float:
+    """Return the largest relative deviation of one path over one band; arguments as in `compare_paths`."""
+    return _compared(source, target, path, band, factor).max_deviation
 
 
 def certify(

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from pidemu.plain import json_safe
 
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
-RANK: Final = {"exact": 0, "exact-feedback": 1, "approximate": 2, "refused": 3}
+RANK: Final[dict[str, int]] = {"exact": 0, "exact-feedback": 1, "approximate": 2, "refused": 3}
 """Verdicts, the best first."""
 
 EXACT: Final = 1e-9
@@ -122,6 +122,8 @@ class ScanByScan:
         Largest difference while the setpoint rests and only the measurement moves [% of the output span].
     size : float
         What the source's output moves over [% of the output span].
+    same_rules : bool
+        Whether both compute by the same scan rules at the same interval: then equal laws have equal outputs.
     """
 
     scan: tuple[float, float]
@@ -131,6 +133,7 @@ class ScanByScan:
     segment: str
     on_measurement: float
     size: float
+    same_rules: bool = False
 
     @property
     def is_exact(self) -> bool:
@@ -208,31 +211,37 @@ class LoopComparison:
     target: LoopFigures
 
 
+TooSlow = Literal["", "source", "target", "both"]
+
+COARSE: Final = 1e-3
+"""What rounding may cost in the loop band before it counts against the verdict."""
+LEAST_PHASE: Final = 1.0
+"""Phase that may be lost to a scan without a word in the verdict [deg]."""
+
+
 @dataclass(frozen=True, slots=True)
 class ScanCost:
-    """What a change of scan interval costs at the end of the loop band, before and after compensation.
+    """What the scan intervals and rules of two controllers cost, apart from what their laws differ by.
 
     Attributes
     ----------
     at : float
-        The end of the loop band [rad/s].
+        The crossover of the loop, or where it usually lies without a process [rad/s]; NaN for proportional action alone.
     phase_deg : float
-        Phase that the target's hold has less than the source's, half the difference of the intervals [deg]; negative: it gains.
-    compensated : bool
-        Whether the settings make up for interval and rule.
-    uncompensated : float
-        Largest deviation of the held, sampled controllers in the loop band with the settings of the continuous law; with the
-        settings themselves where these are those of the textbook rule or constrained, which know nothing of scans. Infinite where
-        a filter would be unstable.
-    cut : bool
-        Whether half the scan rate lies within the loop band, and ends it.
+        Phase that the target, sampled and held, loses there against the source [deg]; negative: it gains. Infinite where it cannot
+        be said, since a scan is too slow.
+    too_slow : {"", "source", "target", "both"}
+        Whose scan interval is so long that half the scan rate lies below that frequency.
     """
 
     at: float
     phase_deg: float
-    compensated: bool
-    uncompensated: float
-    cut: bool = False
+    too_slow: TooSlow = ""
+
+    @property
+    def matters(self) -> bool:
+        """Whether more than a degree of phase is lost."""
+        return self.phase_deg > LEAST_PHASE
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,6 +258,12 @@ class Certificate:
         The setpoint kicks of the continuous laws.
     setpoint_kick_at_scan : Kick or None
         What the output moves by in the first scan, at the two scan intervals.
+    setpoint_in_cascade : PathComparison or None
+        The continuous setpoint paths in cascade, where one of the equations is another one there and both modes count.
+    kick_in_cascade : Kick or None
+        The setpoint kicks in cascade, likewise.
+    compensated : bool
+        Whether the settings make up for the scans: what counts is then the laws at the scan intervals, else the continuous ones.
     time_scale : float
         The source's effective integral time, which places the loop band [s].
     scan_by_scan : ScanByScan or None
@@ -263,8 +278,8 @@ class Certificate:
         The closed loop before and after, where a process was given.
     dials : tuple of Rounded
         What rounding to the target's resolution did.
-    feedback_before_rounding : PathComparison or None
-        The feedback path with the dials not rounded, where they were.
+    feedback_before_rounding, setpoint_before_rounding : PathComparison or None
+        The paths that count with the dials not rounded, where they were.
     """
 
     feedback: PathComparison
@@ -274,6 +289,9 @@ class Certificate:
     setpoint_kick: Kick
     setpoint_kick_at_scan: Kick | None
     time_scale: float
+    setpoint_in_cascade: PathComparison | None = None
+    kick_in_cascade: Kick | None = None
+    compensated: bool = False
     scan_by_scan: ScanByScan | None = None
     not_emulated: str = ""
     scan_cost: ScanCost | None = None
@@ -281,28 +299,51 @@ class Certificate:
     loop: LoopComparison | None = None
     dials: tuple[Rounded, ...] = ()
     feedback_before_rounding: PathComparison | None = None
+    setpoint_before_rounding: PathComparison | None = None
 
     @property
     def headline(self) -> PathComparison:
-        """The feedback path as it runs: at the scan intervals where these were given, else of the continuous law."""
-        return self.feedback_at_scan or self.feedback
+        """The feedback path that counts: of the continuous laws, or at the scan intervals where the settings make up for these."""
+        return (self.compensated and self.feedback_at_scan) or self.feedback
+
+    @property
+    def setpoint_headline(self) -> PathComparison:
+        """The setpoint path that counts, likewise; in the first of the modes looked at."""
+        return (self.compensated and self.setpoint_at_scan) or self.setpoint
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether something beyond the law differs that signals within the limits show: a deadband, a rate limit, the arithmetic."""
+        return not {d.aspect for d in self.nonlinear}.isdisjoint(("error", "output", "arithmetic"))
 
     @property
     def verdict(self) -> Verdict:
-        """``exact``, ``exact-feedback`` or ``approximate``: laws at the scans, and emulations, count where there are any."""
-        emulated, aspects = self.scan_by_scan, {d.aspect for d in self.nonlinear}
-        bent = not aspects.isdisjoint(
-            ("error", "output")
-        )  # a deadband, a rate limit: signals that are large or small enough show it
-        if bent or not self.headline.is_exact or not (emulated is None or emulated.is_exact_on_measurement):
+        """``exact``, ``exact-feedback`` or ``approximate``; where both modes count, the worse of the two."""
+        return max((self.verdict_in("auto"), self.verdict_in("cascade")), key=RANK.__getitem__)
+
+    @property
+    def rounding(self) -> float | None:
+        """What rounding the dials costs in the loop band; ``None`` where none was rounded, or where they were not exact before."""
+        before = self.feedback_before_rounding
+        return self.headline.loop_band.max_deviation if before is not None and before.is_exact else None
+
+    def verdict_in(self, mode: Literal["auto", "cascade"]) -> Verdict:
+        """Return the verdict in one mode; they differ only where `setpoint_in_cascade` is stated."""
+        emulated = None if self.dials else self.scan_by_scan
+        contradicted = emulated is not None and emulated.same_rules and not emulated.is_exact_on_measurement
+        slow = self.scan_cost is not None and self.scan_cost.matters and not self.compensated
+        coarse = self.rounding is not None and self.rounding > COARSE
+        if self.is_bent or contradicted or slow or coarse or not (self.feedback_before_rounding or self.headline).is_exact:
             return "approximate"
-        same = (self.setpoint_at_scan or self.setpoint).is_exact and (emulated is None or emulated.is_exact)
-        return "exact" if same and "setpoint" not in aspects else "exact-feedback"
+        path = self.setpoint_before_rounding or self.setpoint_headline
+        if mode == "cascade" and self.setpoint_in_cascade is not None:
+            path = self.setpoint_in_cascade
+        return "exact" if path.is_exact and "setpoint" not in {d.aspect for d in self.nonlinear} else "exact-feedback"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""
         plain: dict[str, Any] = json_safe(asdict(self))
-        for name in ("setpoint_kick", "setpoint_kick_at_scan"):
+        for name in ("setpoint_kick", "setpoint_kick_at_scan", "kick_in_cascade"):
             kick: Kick | None = getattr(self, name)
             if kick is not None:
                 plain[name]["ratio"] = json_safe(kick.ratio)

@@ -116,6 +116,21 @@ def emulated(
         segment=_segment_at(record.segments, when + _HAIR * scans[0]),
         on_measurement=float(np.max(still)),
         size=float(np.max(np.abs(ours - REST))),
+        same_rules=scans[0] == scans[1] and _rules(source) == _rules(target),
+    )
+
+
+def _rules(settings: Settings) -> tuple[object, ...]:
+    """Return what makes a sequence of outputs out of a law: scan rules, order of things within a scan."""
+    a = settings.algorithm()
+    lags = (a.sp_filter, a.pv_filter, a.e_filter)
+    return (
+        a.integral_rule if a.ki else None,
+        a.derivative_rule if a.kd else None,
+        a.filter_rule if a.Tf else None,
+        a.previous_pv,
+        a.precision,
+        *(lag and lag.rule for lag in lags),
     )
 
 

@@ -3,68 +3,95 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 
-from pidemu.certificate.models import Certificate, Kick, LoopComparison
+from pidemu.certificate.models import COARSE, Certificate, Kick, LoopComparison, ScanCost
 
 
-def sentence(c: Certificate) -> str:
+def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[str] = ()) -> str:
     """Return what the certificate amounts to, in words a technician understands.
 
     Parameters
     ----------
     c : Certificate
         The certificate.
+    conditions : sequence of str
+        Facts that the verdict rests on, to stand behind "if".
+    assumed : sequence of str
+        What was taken though it should have been asked.
     """
-    return " ".join(filter(None, (_of_the_controllers(c), "" if c.loop is None else _of_the_loop(c.loop))))
+    parts = [_assuming(assumed), _of_the_controllers(c, conditions), *_of_the_scans(c), *_of_the_loop(c.loop)]
+    return " ".join(filter(None, parts))
 
 
-def _of_the_controllers(c: Certificate) -> str:
+def _assuming(assumed: Sequence[str]) -> str:
+    return f"Assuming {' and '.join(assumed)}, which was not stated." if assumed else ""
+
+
+def _if(conditions: Sequence[str]) -> str:
+    """Return the conditions: two in full, the others by their number."""
+    if not conditions:
+        return ""
+    more = len(conditions) - 2
+    rest = f" (and {more} more, below)" if more > 0 else ""
+    return f", if {' and '.join(conditions[:2])}{rest}"
+
+
+def _of_the_controllers(c: Certificate, conditions: Sequence[str]) -> str:
+    limits = ", inside its limits" if any(d.aspect == "windup" for d in c.nonlinear) else ""
+    law = (c.feedback_before_rounding or c.headline).is_exact
     if c.verdict == "exact":
-        return "The new controller does what the old one did, to load disturbances and to setpoint changes alike."
-    setpoint = (c.setpoint_at_scan or c.setpoint).is_exact
+        return f"The new controller does what the old one did, for disturbances and for setpoint changes{limits}{_if(conditions)}."
     if c.verdict == "exact-feedback":
         return (
-            "Against disturbances, and in stability, the new controller does exactly what the old one did; "
-            f"setpoint changes will look different{_kick(c.setpoint_kick_at_scan or c.setpoint_kick)}."
+            f"For disturbances, and in stability, the new controller does what the old one did{limits}{_if(conditions)}; "
+            f"{_setpoint(c)}."
         )
-    if c.headline.is_exact:
-        other = "" if setpoint else f" Setpoint changes will look different{_kick(c.setpoint_kick_at_scan or c.setpoint_kick)}."
-        return f"Against disturbances the two equations are the same, but {_emulated(c)}.{other}"
-    band = c.headline.loop_band
-    if c.scan_cost is not None and c.scan_cost.cut:
+    if law and not c.is_bent and (c.rounding or 0) <= COARSE:
+        other = "" if c.setpoint_headline.is_exact else f" Setpoint changes differ too: {_setpoint(c)}."
+        return f"The two equations are the same{_if(conditions)}; what differs is when they are computed.{other}"
+    if law and c.is_bent:
         return (
-            f"A scan interval is too long for this loop, whose integral time is {c.time_scale:.3g} s: half the scan rate lies "
-            "within the loop band, and the figures cover what is left of it. Expect to tune the loop again, slower."
+            f"The two equations are the same{_if(conditions)}, but one controller does something to its signals that the other does not: "
+            "see what to watch for."
         )
-    return (
-        f"The new controller comes within {_percent(band.max_deviation)} of the old one where the loop works: up to "
-        f"{band.gain_db:.2f} dB of gain margin and {band.phase_deg:.1f} degrees of phase margin may be lost or won. "
-        f"{_advice(band.gain_db, band.phase_deg)}"
-    )
+    if law:
+        return f"The two equations are the same{_if(conditions)}, but the dials round so coarsely that {_differ(c)}."
+    return f"Where the crossover of the loop {_lies(c)}, {_differ(c)}{_if(conditions)}.{_also(c)}"
 
 
-def _advice(gain_db: float, phase_deg: float) -> str:
-    """Judge by usual margins, 6 dB and 30 to 60 degrees: a tenth of them is little, a third is much."""
-    if gain_db <= 0.6 and phase_deg <= 3:
-        return "That is little beside usual margins."
-    if gain_db <= 2 and phase_deg <= 10:
-        return "A loop with usual margins stays stable, but will look a little different: watch it after the cut-over."
-    return "That is much: expect to tune the loop again."
+def _lies(c: Certificate) -> str:
+    return "usually lies" if c.loop is None else "lies"
 
 
-def _of_the_loop(loop: LoopComparison) -> str:
-    old, new = loop.source.stable, loop.target.stable
-    if new:
-        return "" if old else "With this process the loop is unstable before and stable after: check the process."
-    if old:
-        return "WITH THIS PROCESS THE LOOP WOULD BE UNSTABLE: do not use these settings."
-    return "With this process the loop is unstable, before and after: check the process, or the action."
+def _differ(c: Certificate) -> str:
+    band = c.headline.loop_band
+    return f"the controller's gain differs by up to {_number(band.gain_db)} dB and its phase by up to {_number(band.phase_deg)} degrees"
+
+
+def _also(c: Certificate) -> str:
+    kick = c.setpoint_kick
+    same = kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=0.02)
+    return "" if same else f" Setpoint changes: {_kick(kick)}."
+
+
+def _setpoint(c: Certificate) -> str:
+    """Return how setpoint changes differ, by mode where that matters."""
+    cascade = c.setpoint_in_cascade
+    if cascade is None or c.kick_in_cascade is None:
+        return f"setpoint changes differ: {_kick(c.setpoint_kick)}"
+    auto = (c.setpoint_before_rounding or c.setpoint_headline).is_exact
+    if auto:
+        return f"in automatic also for setpoint changes, in cascade these differ: {_kick(c.kick_in_cascade)}"
+    if cascade.is_exact:
+        return f"in cascade also for setpoint changes, in automatic these differ: {_kick(c.setpoint_kick)}"
+    return f"setpoint changes differ: in automatic {_kick(c.setpoint_kick)}, in cascade {_kick(c.kick_in_cascade)}"
 
 
 def _kick(kick: Kick) -> str:
-    if kick.source == kick.target:
-        return ""
-    return f": a step {_moves(kick.target)}, before it {_moved(kick.source)}"
+    if kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=1e-6):
+        return "the first move of the output is the same, what follows is not"
+    return f"a step {_moves(kick.target)}, with the old controller it {_moved(kick.source)}"
 
 
 def _moves(kick: float) -> str:
@@ -76,20 +103,59 @@ def _moves(kick: float) -> str:
 def _moved(kick: float) -> str:
     if math.isinf(kick):
         return "spiked it"
-    return f"was {kick:.3g}" if kick else "did not"
+    return f"moved by {kick:.3g} %" if kick else "did not"
 
 
-def _emulated(c: Certificate) -> str:
-    e = c.scan_by_scan
-    if e is None:
-        return "they could not be run to prove it"
-    if e.is_exact_on_measurement:
-        return "one has a nonlinear option that the other has not: see what to watch for"
-    return (
-        f"run scan by scan, with the setpoint at rest, they differ by up to {_percent(e.on_measurement / 100)} of span on test "
-        f"signals that move the output by {e.size:.3g} %, because of scan rule, arithmetic or a nonlinear option"
-    )
+def _of_the_scans(c: Certificate) -> Iterator[str]:
+    cost = c.scan_cost
+    if cost is None:
+        return
+    if cost.too_slow:
+        yield f"{_SLOW[cost.too_slow]} for this loop: half the scan rate lies below the crossover. Scan faster, or tune again, slower."
+    elif abs(cost.phase_deg) >= _LEAST:
+        yield _phase(c, cost)
 
 
-def _percent(x: float) -> str:
-    return "more than 1000 %" if x > 10 else f"{float(f'{100 * x:.2g}'):g} %"
+_LEAST = 0.05
+"""Phase that is worth a word [deg]."""
+_SLOW = {"source": "The old scan was too slow", "target": "The new scan is too slow", "both": "Both scans are too slow"}
+
+
+def _phase(c: Certificate, cost: ScanCost) -> str:
+    scans = None if c.scan_by_scan is None else c.scan_by_scan.scan
+    gained = cost.phase_deg < 0
+    what = f"the loop {'gains' if gained else 'loses'} {_number(abs(cost.phase_deg))} degrees of phase at {cost.at:.3g} rad/s"
+    if scans is not None and scans[0] != scans[1]:
+        return f"The new controller scans {'faster' if scans[1] < scans[0] else 'more slowly'}: {what}."
+    return f"By the scan rules {what}."
+
+
+def _of_the_loop(loop: LoopComparison | None) -> Iterator[str]:
+    if loop is None:
+        return
+    old, new = loop.source, loop.target
+    if not new.stable:
+        yield (
+            "WITH THIS PROCESS THE LOOP WOULD BE UNSTABLE: do not use these settings."
+            if old.stable
+            else "With this process the loop is unstable, before and after: check the process, or the action."
+        )
+        return
+    if not old.stable:
+        yield "With this process the loop is unstable before and stable after: check the process."
+        return
+    figures = [
+        f"{name} from {_number(x)} to {_number(y)}{unit}"
+        for name, x, y, unit in (
+            ("gain margin", old.gain_margin, new.gain_margin, ""),
+            ("phase margin", old.phase_margin, new.phase_margin, " degrees"),
+            ("Ms", old.Ms, new.Ms, ""),
+        )
+        if math.isfinite(x) and math.isfinite(y)
+    ]
+    if figures:
+        yield f"With this process: {', '.join(figures)}."
+
+
+def _number(x: float) -> str:
+    return f"{float(f'{x:.3g}'):g}"

@@ -135,22 +135,17 @@ def _action(source: Settings, target: Settings) -> Iterator[str]:
 
 
 def _scan(c: Conversion) -> Iterator[str]:
-    cost = c.certificate.scan_cost
-    if c.scan is None or cost is None:
+    if c.scan is None:
         return
     for what in c.settings.algorithm(scan=c.scan[1]).too_coarse(c.scan[1]):
         yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
-    now = c.certificate.headline.loop_band.max_deviation
     if c.scan[0] != c.scan[1]:
-        change = "costs" if cost.phase_deg > 0 else "gains"
         yield (
-            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: that {change} {abs(cost.phase_deg):.2g} degrees of phase "
-            f"at {cost.at:.3g} rad/s, half the difference as dead time; with it the loop-band deviation is {now:.2%}; do not scale "
-            "the gain by their ratio: the settings are per second, not per scan, and a gain so scaled is wrong by that ratio"
+            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: the settings are per second, so do not scale the gain by the "
+            "ratio of the intervals"
         )
-    if cost.compensated:
+    if c.request.compensate:
         yield (
-            "the settings make up for scan intervals and rules: those of the continuous law would deviate by "
-            f"{cost.uncompensated:.2%}, these by {now:.2%}; they are right for these intervals only, and '--no-compensation' gives "
-            "the others"
+            "the settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules that "
+            "are often only assumed"
         )

@@ -7,12 +7,14 @@ from contextlib import suppress
 from dataclasses import replace
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form
+from pidemu.card.base import Form, Status
 from pidemu.certificate.linear import certify
 from pidemu.certificate.models import EXACT, RANK, Certificate
 from pidemu.conversion import match as closed
 from pidemu.conversion.aim import Match
+from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.modes import Mode, in_mode, law_in
 from pidemu.conversion.moments import Problem, Way, meet, sizes
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import SettingError
@@ -20,6 +22,8 @@ from pidemu.law import Law
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
+_DEAR = 0.01
+"""Deviation in the loop band from which leaving a filter as delivered costs too much."""
 _ROUNDING = 1e-6
 """Deviation that rounding may make of an exact match where its numbers nearly cancel."""
 
@@ -35,13 +39,16 @@ class ClosedForms:
         What to convert to; a match fixes its filter.
     factor : float
         What the source's gain is multiplied by for new signal ranges.
+    mode : {"auto", "cascade"}
+        The mode in which the setpoint weights are matched.
     """
 
-    def __init__(self, source: Settings, target: Target, factor: float) -> None:
+    def __init__(self, source: Settings, target: Target, factor: float, mode: Mode = "auto") -> None:
         self.source = source
         self.target = target
         self.factor = factor
-        algorithm = source.algorithm()
+        self.mode = mode
+        algorithm = in_mode(source.algorithm(), mode)
         self.law = Law(algorithm)
         self.scaled = Law(scaled(algorithm, factor))
         self.original_filter = target.filter
@@ -70,76 +77,146 @@ class ClosedForms:
         return a.kp * time.canonical if a.series and a.kd and time is not None else a.kd
 
     def solve(self, match: Match | None) -> tuple[Settings, Match]:
-        """Return the target's settings and how they were found: by the source's own numbers, exactly, or at low frequencies.
+        """Return the target's settings and how they were found: exactly, or at low frequencies.
 
         Raises
         ------
         NoMatchError, SettingError
             There are none, or they leave the target's ranges.
         """
-        own = self._own()
-        if own is not None and (own[0] == "exact" and match != "low-frequency"):
-            return own[1], "exact"
+        if match == "low-frequency":
+            return self.low_frequency(), match
+        why: NoMatchError | SettingError
         try:
-            return self._matches(match)
-        except (NoMatchError, SettingError):
-            if own is None:
+            return self.exact(), "exact"
+        except (NoMatchError, SettingError) as error:
+            why = error
+            if match == "exact" and self.target.filter.free:
                 raise
-            return own[1], "exact"
-
-    def _own(self) -> tuple[str, Settings] | None:
-        """Return verdict and settings for the source's own numbers, where these are an exact match of a target of its form."""
-        equation, a = self.source.equation, self.scaled.algorithm
-        gain = self.source.by_role(Role.GAIN)
-        if equation.form is not self.target.form:
-            return None
-        K = a.kp or (gain.canonical if gain is not None else 0.0)
-        with suppress(SettingError):
-            settings = self.weighted(Numbers(K, a.ki, self._dial_kd(), a.Tf if self.target.filter.free else None))
-            verdict = self._certify(settings).verdict
-            return None if verdict == "approximate" else (verdict, settings)
-        return None
-
-    def _certify(self, settings: Settings) -> Certificate:
-        return certify(self.law, settings.law(), None, self.factor)
-
-    def _matches(self, match: Match | None) -> tuple[Settings, Match]:
-        why: NoMatchError | SettingError | None = None
-        if match != "low-frequency":
-            try:
-                return self._proven(self._best(closed.exact(self.scaled, self.target))), "exact"
-            except (NoMatchError, SettingError) as error:
-                why = error
-                if match == "exact" and self.target.filter.free:
-                    raise
         try:
-            settings = self._low_frequency()
+            settings = self.low_frequency()
         except (NoMatchError, SettingError) as error:
             raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
-        how: Match = "exact" if self._certify(settings).feedback.is_exact else "low-frequency"
+        how: Match = "exact" if self.certify(settings).feedback.is_exact else "low-frequency"
         if match == "exact" and how != "exact":
             raise NoMatchError("its filter is fixed, and no settings give the same law")
         return settings, how
 
+    def exact(self) -> Settings:
+        """Return settings with the source's law: its own numbers, where these have it, else those of the closed form.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            There are none.
+        """
+        own = None
+        with suppress(SettingError, NoMatchError):
+            own = self.own_numbers(filtered=True)
+        verdict = "approximate" if own is None else self.certify(own).verdict
+        if own is not None and verdict == "exact":
+            return own
+        try:
+            return self._proven(self._best(closed.exact(self.scaled, self.target)))
+        except (NoMatchError, SettingError):
+            if own is None or verdict == "approximate":
+                raise
+            return own
+
+    def own_numbers(self, *, filtered: bool = False) -> Settings:
+        """Return the source's own numbers on a target of its form, their units converted.
+
+        Parameters
+        ----------
+        filtered : bool
+            Whether a filter that can be set takes the source's filter time; otherwise it stays as delivered.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            The target has another form, or does not take them.
+        """
+        equation, a = self.source.equation, self.scaled.algorithm
+        gain = self.source.by_role(Role.GAIN)
+        if equation.form is not self.target.form:
+            raise NoMatchError(f"the source is of {equation.form.value} form, the target of {self.target.form.value} form")
+        K = a.kp or (gain.canonical if gain is not None else 0.0)
+        return self.weighted(Numbers(K, a.ki, self._dial_kd(), a.Tf if filtered and self.target.filter.free else None))
+
+    def certify(self, settings: Settings) -> Certificate:
+        """Return the figures of both continuous laws, in this conversion's mode."""
+        return certify(self.law, law_in(settings, self.mode), None, self.factor)
+
     def _proven(self, settings: Settings) -> Settings:
         """Refuse an exact match that is none: whatever the card says of its terms, the law decides."""
-        if self._certify(settings).feedback.full_band.max_deviation > _ROUNDING:
+        if self.certify(settings).feedback.full_band.max_deviation > _ROUNDING:
             raise NoMatchError("no settings give the same law")
         return settings
 
-    def _low_frequency(self) -> Settings:
-        """Match the moments, with a free filter set as near as its range allows to the source's, or left as delivered."""
-        delivered = replace(self.target.filter, free=False)
-        if self.target.filter.free:
-            self.target.filter = self.target.filter.nearest_to(*self._wanted_filter())
-            with suppress(NoMatchError, SettingError):
-                return self._with_the_moments(self._best(self._matched(self.scaled.moments(), self.target.filter)))
+    def low_frequency(self) -> Settings:
+        """Match the moments, with the filter as the target fixes it or as it is delivered.
+
+        A filter that can be set takes the source's filter time where it costs more than 1 % in the loop band to leave it, and the
+        source's filter is documented, measured or inferred: an assumed one is not imitated, and neither is the lack of one.
+        """
+        original = self.target.filter
+        delivered = replace(original, free=False)
+        settings, why = None, None
+        try:
+            settings = self._with_filter(delivered)
+        except (NoMatchError, SettingError) as error:
+            why = error
+        a = self.scaled.algorithm
+        self.target.filter = original
+        imitated = original.free and a.kd and a.Tf and filter_status(self.source) is not Status.ASSUMED
+        if imitated and (settings is None or self.certify(settings).feedback.loop_band.max_deviation > _DEAR):
+            like_the_source = self._with_the_sources_filter()
+            if like_the_source is not None:
+                return like_the_source
+        if settings is None:
+            assert why is not None
+            raise why
         self.target.filter = delivered
-        return self._with_the_moments(self._best(self._matched(self.scaled.moments(), delivered)))
+        return settings
+
+    def _with_the_sources_filter(self) -> Settings | None:
+        """Return what is nearest with the source's filter time: the same moments, or the source's own numbers."""
+        found: list[Settings] = []
+        with suppress(NoMatchError, SettingError):
+            kept = self._gain_and_integral_kept()
+            if self.certify(kept).feedback.loop_band.max_deviation <= _DEAR:
+                return kept
+        with suppress(NoMatchError, SettingError):
+            found.append(self.own_numbers(filtered=True))
+        with suppress(NoMatchError, SettingError):
+            found.append(self._with_filter(self.target.filter.nearest_to(*self._wanted_filter())))
+        return min(found, key=lambda s: self.certify(s).feedback.loop_band.max_deviation, default=None)
+
+    def _gain_and_integral_kept(self) -> Settings:
+        """Return the source's gain and integral with its filter time, and the derivative that keeps the moments.
+
+        Raises
+        ------
+        NoMatchError, SettingError
+            The target has another form or filter, or does not take them.
+        """
+        a, (_, m1, m2) = self.scaled.algorithm, self.scaled.moments()
+        equation, filt = self.source.equation, self.target.filter
+        K = a.kp
+        if equation.form is not self.target.form or filt.lead_lag or self.target.shape.filter_on != "term" or not (K and a.ki):
+            raise NoMatchError("gain and integral cannot be kept")
+        kd = K * (m1 - K) / a.ki if self.target.form is Form.SERIES else m2
+        if kd * K <= 0:
+            raise NoMatchError("the derivative would turn round")
+        return self.weighted(Numbers(K, a.ki, kd, a.Tf))
+
+    def _with_filter(self, filt: TargetFilter) -> Settings:
+        self.target.filter = filt
+        return self._with_the_moments(self._best(self._matched(self.scaled.moments(), filt)))
 
     def _with_the_moments(self, settings: Settings) -> Settings:
         """Return the settings or, behind a filter that no closed form knows, such that have the moments."""
-        wanted, found = self.scaled.moments(), settings.law().moments()
+        wanted, found = self.scaled.moments(), settings.law().moments()  # of the feedback path, which no mode changes
         if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
             return settings
         return self.through(lambda problem, _: meet(problem), settings)
@@ -204,7 +281,7 @@ class ClosedForms:
             except SettingError as error:
                 refused = refused or error
                 continue
-            rank = RANK[self._certify(settings).verdict]
+            rank = RANK[self.certify(settings).verdict]
             if i == 0 or rank < RANK["approximate"]:
                 found.append((rank, settings))
         if not found:
@@ -216,14 +293,18 @@ class ClosedForms:
         return float(self.target.algorithm_of(replace(numbers, Tf=None)).Tf)
 
     def _wanted_filter(self) -> tuple[float, float]:
-        """Return the filter time that the next moment asks for, and the derivative time it goes with [s]."""
-        *moments, m3 = self.scaled.expansion(4)
-        _, m1, m2 = closed.without_rounding(moments)
-        if m2 == 0:
-            return 0.0, 0.0
+        """Return the source's filter time, and the derivative time on the target that it goes with [s].
+
+        Series forms have their derivative between the lead of the numerator and the filter; the others by the second moment.
+        """
+        a = self.scaled.algorithm
+        _, m1, m2 = closed.without_rounding(self.scaled.moments())
+        behind = replace(self.target.filter, kind="time", value=a.Tf, free=False)
+        numbers = next(iter(closed.low_frequency(self.scaled.moments(), self.target, behind)), None)
+        if numbers is not None and self.target.shape.filter_on == "term":
+            return a.Tf, float(self.target.filter_base(numbers))
         plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"
-        per = 1.0 if plain else m1 or self.target.idle_gain
-        return max(0.0, -m3 / m2), m2 / per
+        return a.Tf, m2 / (1.0 if plain else m1 or self.target.idle_gain)
 
     def weighted(self, numbers: Numbers, problem: Problem | None = None) -> Settings:
         """Return settings of the target, with the setpoint weights that keep the setpoint path, as far as their ranges allow."""

@@ -12,15 +12,18 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
-from pidemu.conversion.choices import Attempt, attempts
+from pidemu.conversion.asking import ask, mode_is_open, mode_question
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.moments import check_optimiser
+from pidemu.conversion.options import Attempt, attempts
+from pidemu.conversion.questions import Question
 from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
+from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
@@ -39,15 +42,19 @@ def convert(
     options: Mapping[str, object] | None = None,
     given: Mapping[str, object] | None = None,
     scan: float | tuple[float, float] | None = None,
+    runs_every: float | tuple[float, float] | None = None,
+    mode: str = "both",
+    action: str | None = None,
+    to_pv_range: object = None,
+    to_op_range: object = None,
     match: str | None = None,
-    allow_approximate: bool = False,
-    pv_range: tuple[float, float] | None = None,
-    op_range: tuple[float, float] | None = None,
-    round_dials: bool = False,
     process: Process | None = None,
-    compensate: bool = True,
-    all_options: bool = False,
+    compensate: bool = False,
+    digits: int | None = None,
+    allow_approximate: bool = False,
+    assume: bool = False,
     emulate: bool = True,
+    tag: str = "",
 ) -> Conversion:
     """Convert settings to another card.
 
@@ -58,31 +65,42 @@ def convert(
     target : str, path or Card
         The card to convert to, its id, or its file.
     options : mapping, optional
-        Options of the target. Those not named are chosen so that the verdict is best, the card's defaults where these are as good.
+        Options of the target. Those not named are chosen as an engineer would: the same terms see the setpoint, the better verdict,
+        the same form, the source's own numbers, what is documented (specs/equations.md, section 9).
     given : mapping, optional
         Dials of the target that shall have these values, such as a filter factor or a setpoint weight.
     scan : float or tuple of float, optional
-        Scan interval of both, or of source and target [s]: the settings make up for intervals and rules that differ, and
-        certificate and verdict are about the laws at these scans.
+        Scan interval that both, or source and target, compute with [s]: the certificate states what they cost.
+    runs_every : float or tuple of float, optional
+        Interval at which the source, or source and target, are really executed, where that is another one [s]. All times of an
+        algorithm that is executed every `H` and computes with `h` are `H/h` times those on its dials.
+    mode : {"both", "auto", "cascade"}
+        Which setpoint counts: the operator's, a remote one, or both.
+    action : {"reverse", "direct"}, optional
+        The control action, reverse: the output falls when the measurement rises. The dials do not depend on it.
+    to_pv_range, to_op_range : tuple, optional
+        Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity rescales
+        the gains, the same signal on another scale does not.
     match : str, optional
-        How to match: ``"exact"``, ``"low-frequency"``, ``"textbook"``, ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover
-        with the process), ``"loop"`` (with a process: the load response changes least), ``"constrained"`` (the largest deviation in
-        the loop band is least); by default exact where possible, else low-frequency.
-    allow_approximate : bool
-        Where the target refuses, return the nearest settings instead of raising.
-    pv_range, op_range : tuple of float, optional
-        Signal ranges of the target [engineering units]; by default the source's. Where they differ, gains are rescaled for
-        the same effect in engineering units.
-    round_dials : bool
-        Round the dials to the target's resolution; the certificate states the effect.
+        How to match: ``"exact"``, ``"same-numbers"`` (the source's own), ``"low-frequency"``, ``"textbook"``,
+        ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load response
+        changes least), ``"constrained"`` (the largest deviation in the loop band is least); by default the first of these that is
+        near enough.
     process : Process, optional
         The process, for the figures of the closed loop before and after, and to place the loop band.
     compensate : bool
         Whether the settings make up for scan intervals and rules that differ; otherwise they are those of the continuous law.
-    all_options : bool
-        Try every choice of the options, also where the card's defaults are exact: see `Conversion.ranking`.
+    digits : int, optional
+        Round the dials to their resolution or, where the card states none, to so many significant digits: the certificate is about
+        these numbers. By default they are not rounded.
+    allow_approximate : bool
+        Where the target refuses, return the nearest settings instead of raising.
+    assume : bool
+        Take the cards' defaults for everything that would be asked; the sentence then begins with what was assumed.
     emulate : bool
         Whether the certificate emulates both controllers; without it the linear figures alone are stated, sooner.
+    tag : str
+        The loop's name, for the certificate.
 
     Returns
     -------
@@ -91,12 +109,14 @@ def convert(
 
     Raises
     ------
+    QuestionError
+        Something was not stated, and the result depends on it; the error holds the questions with what each answer would give.
     ConversionRefusedError
         The target cannot do what the source does; the error holds the nearest settings and what they would cost.
     SettingError, CardError
-        The target, the match, an option or a given dial is unknown, or a range of the source is missing.
+        The target, the match, an option or a given dial is unknown.
     ScanError
-        A scan interval is no positive number, or a filter is unstable at it.
+        A scan interval is not a positive number, or a filter is unstable at it.
 
     Examples
     --------
@@ -106,57 +126,151 @@ def convert(
     >>> conv.verdict, round(conv.settings["K"].value, 4), conv.settings["Ti"].value, conv.settings["Td"].value
     ('exact', 2.6667, 20.0, 3.75)
     """
-    aim = _aim(match, process)
     card = target if isinstance(target, Card) else load_card(target)
+    request = read_request(
+        card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
+        pv_range=to_pv_range, op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        allow_approximate=allow_approximate, assume=assume, tag=tag,
+    )  # fmt: skip
+    return converted(source, card, request, emulate=emulate)
+
+
+def converted(source: Settings, card: Card, request: Request, *, emulate: bool = True) -> Conversion:
+    """Return the conversion that a request asks for; see `convert`."""
+    aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    request = read_request(card, options, given, scan, match, pv_range, op_range)
-    request = replace(request, process=process, compensate=compensate, allow_approximate=allow_approximate, round_dials=round_dials)
-    factor = _rescaling(source, request)
-    taken = {**(source.options if source.card.id == card.id else {}), **request.options}
-    fixed = {**_shared(source, card), **request.given}
-    if request.scan is not None:
-        source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
-
-    def solver(named: Mapping[str, object]) -> Solver:
-        goal = Target(card, named, fixed, request.pv_range or source.pv_range, request.op_range or source.op_range)
-        goal.reject_missing()
-        sign = -1 if _is_negative(source, goal) else 1
-        return Solver(source, goal, sign * factor, request.scan, process, compensate=compensate)
-
-    ranking = attempts(card, taken, solver, aim, wanted=request.given, every=all_options)
+    source = _paced(source, request)
+    opens = tuple(unstated(source))
+    ask([o.question for o in opens if o.asked], source, card, request)
+    work = _Work(source, card, request, aim)
+    ranking = work.ranking()
+    if mode_is_open(source, ranking, request):
+        ask(work.mode_question(), source, card, request)
+        ranking = work.ranking("auto")
     best, refusal, settings = ranking[0], "", ranking[0].settings
     if settings is None:
         best, refusal, settings = _nearest(ranking)
-        refusal += _other_options(attempts(card, {}, solver, aim, wanted=request.given, every=False)[0], taken) if options else ""
+        refusal += work.other_options()
         if settings is None:
             raise ConversionRefusedError(refusal)
+    conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
+    conversion = replace(conversion, opens=opens)
+    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
+    if conversion.refusal and not request.allow_approximate:
+        raise ConversionRefusedError(conversion.refusal, conversion)
+    return conversion
+
+
+def _concluded(
+    best: Attempt,
+    settings: Settings,
+    refusal: str,
+    source: Settings,
+    request: Request,
+    ranking: tuple[Attempt, ...],
+    *,
+    emulate: bool,
+) -> Conversion:
+    """Return the conversion with its certificate, about the dials as they are printed."""
     work = best.solver
     assert work is not None  # there are settings
-    before = settings
-    settings, dials = rounded(settings) if round_dials else (settings, ())
-    certificate = full_certificate(work, settings, work.scan_cost(before, best.match), emulate=emulate)
+    unrounded, dials = settings, ()
+    if request.digits is not None:
+        settings, dials = rounded(settings, request.digits, request.given)
+    certificate = full_certificate(work, settings, unrounded, emulate=emulate)
     if dials:
-        certificate = replace(certificate, dials=dials, feedback_before_rounding=work.certify(before).feedback)
-    conversion = Conversion(
+        certificate = replace(certificate, dials=dials)
+    return Conversion(
         source=source,
         settings=settings,
+        unrounded=unrounded,
         match=best.match,
         certificate=certificate,
         textbook=_textbook(work),
         warnings=(),
         refusal=refusal,
-        chosen=dict(best.changed),
+        chosen=_chosen(settings, request),
         ranking=ranking,
         factor=work.factor,
         scan=request.scan,
-        process=process,
+        process=request.process,
         request=request,
     )
-    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
-    if refusal and not allow_approximate:
-        raise ConversionRefusedError(refusal, conversion)
-    return conversion
+
+
+class _Work:
+    """One conversion: its source, card and request, from which solvers for any choice of the options are made."""
+
+    def __init__(self, source: Settings, card: Card, request: Request, aim: Aim) -> None:
+        self.source = source
+        self.card = card
+        self.request = request
+        self.aim = aim
+        self.factor = _rescaling(source, request)
+        self.fixed = {**_shared(source, card), **request.given}
+        self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
+        if request.scan is not None:
+            source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
+
+    def ranking(self, mode: str | None = None, taken: Mapping[str, object] | None = None) -> tuple[Attempt, ...]:
+        """Return every choice of the options, the best first."""
+        request = self.request if mode is None else replace(self.request, mode=mode)
+
+        def solver(named: Mapping[str, object]) -> Solver:
+            source = self.source
+            goal = Target(
+                self.card, named, self.fixed, request.pv_range or source.pv_range, request.op_range or source.op_range, request.pace[1]
+            )
+            goal.reject_missing()
+            sign = -1 if _is_negative(source, goal) else 1
+            return Solver(
+                source, goal, sign * self.factor, request.scan, request.process, compensate=request.compensate, mode=request.mode
+            )
+
+        return attempts(self.card, self.taken if taken is None else taken, solver, self.aim, wanted=request.given)
+
+    def mode_question(self) -> list[Question]:
+        """Return the question for the mode, where the answers lead to other settings."""
+        best = [self.ranking(mode)[0].settings for mode in ("auto", "cascade")]
+        if best[0] == best[1]:
+            return []
+        return [mode_question(self.source)]
+
+    def other_options(self) -> str:
+        """Return which options, instead of those that the user chose, would do; empty where none would."""
+        if not self.request.options:
+            return ""
+        attempt = self.ranking(taken={})[0]
+        if attempt.settings is None:
+            return ""
+        chosen = attempt.settings.options
+        words = {
+            n: chosen[n]
+            for n in chosen
+            if n in attempt.changed or (n in self.taken and str(self.taken[n]).casefold() != chosen[n].casefold())
+        }
+        text = " ".join(f'--set "{n}={c}"' if " " in c else f"--set {n}={c}" for n, c in words.items())
+        return f"; other options would do: {text}: {attempt.verdict}"
+
+
+def _paced(source: Settings, request: Request) -> Settings:
+    """Return the source as it really runs, where its interval is not the one it computes with."""
+    pace = request.pace[0]
+    if pace == 1:
+        return source
+    if source.equation.scan.interval == "measured":
+        raise ScanError(
+            f"{source.card.id} measures its interval, so it computes with the one at which it runs; leave out runs_every (--runs-every)"
+        )
+    return replace(source, pace=pace)
+
+
+def _chosen(settings: Settings, request: Request) -> dict[str, str]:
+    """Return the options of the target that nobody stated and that are not as the card delivers them."""
+    stated = {name.casefold() for name in request.options}
+    delivered = settings.card.variant({}).chosen
+    return {n: c for n, c in settings.options.items() if n.casefold() not in stated and c != delivered[n]}
 
 
 def _aim(match: str | None, process: Process | None) -> Aim:
@@ -179,18 +293,6 @@ def _nearest(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | Non
         raise first.error or ConversionRefusedError("there are no options left to try")
     settings, refusal = first.solver.refused(first.error)
     return replace(first, match="constrained"), refusal, settings
-
-
-def _other_options(attempt: Attempt, taken: Mapping[str, object]) -> str:
-    """Return which options, instead of those that the user chose, would do; empty where none would."""
-    if attempt.settings is None:
-        return ""
-    chosen = attempt.settings.options
-    words = {
-        n: chosen[n] for n in chosen if n in attempt.changed or (n in taken and str(taken[n]).casefold() != chosen[n].casefold())
-    }
-    text = " ".join(f'--set "{n}={c}"' if " " in c else f"--set {n}={c}" for n, c in words.items())
-    return f"; other options would do: {text}: {attempt.verdict}"
 
 
 def _refuse_recursions(source: Settings, target: Card) -> None:

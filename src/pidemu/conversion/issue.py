@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pidemu.certificate.models import Certificate, ScanCost
+from pidemu.certificate.models import Certificate
 from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.scanwise import common_interval, emulated
 from pidemu.conversion.solve import Solver
@@ -13,21 +13,27 @@ from pidemu.record.standard import scale_of
 from pidemu.settings import Settings
 
 
-def full_certificate(work: Solver, settings: Settings, cost: ScanCost | None, *, emulate: bool) -> Certificate:
+def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, emulate: bool) -> Certificate:
     """Return the certificate of a conversion's settings (specs/equations.md, section 9).
 
     Parameters
     ----------
     work : Solver
         The conversion.
-    settings : Settings
-        The target's settings.
-    cost : ScanCost or None
-        What the scan intervals cost.
+    settings, unrounded : Settings
+        The target's settings as they are printed, and before rounding.
     emulate : bool
         Whether both controllers are emulated, for the points 3, 5 and 6.
     """
-    certificate = replace(work.certify(settings), scan_cost=cost)
+    certificate = replace(work.certify(settings), scan_cost=work.scan_cost(settings), compensated=work.compensates)
+    if settings != unrounded:
+        before = replace(work.certify(unrounded), compensated=work.compensates)
+        certificate = replace(
+            certificate,
+            feedback_before_rounding=before.headline,
+            setpoint_before_rounding=before.setpoint_headline,
+            setpoint_in_cascade=before.setpoint_in_cascade,
+        )
     if not emulate:
         return certificate
     source = work.source

@@ -63,12 +63,20 @@ Way = Callable[[Problem, Sequence[float]], Sequence[float]]
 """A way to solve: from the problem and the source's moments to moments to ask the closed form with."""
 
 
-def meet(problem: Problem) -> Sequence[float]:
+def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
     """Return moments for which the target's law, sampled and held, has the moments of the source's.
 
     A scan rule and a hold change ``m1`` by ``h m0`` and ``m2`` by ``h m1``. What makes up for that is found by Newton's method; the
     map is nearly linear. At equal intervals two unfiltered laws then have the same three coefficients of their increments: they
-    are equal. Moments that the target has no term for stay as they are.
+    are equal.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is wanted.
+    terms : sequence of bool
+        Which of integral, proportional and derivative term are at work. The moment of a term that is not is neither met nor changed:
+        without a derivative, gain and integral stay the source's but for what the rules do to ``m1``.
 
     Raises
     ------
@@ -77,19 +85,21 @@ def meet(problem: Problem) -> Sequence[float]:
     """
     wanted = np.array(problem.wanted.held_expansion(3))
     size = np.array(sizes(wanted.tolist()))
+    free = np.flatnonzero(terms)
 
     def missing(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         found: npt.NDArray[np.float64] = np.array(problem.law((x * size).tolist()).held_expansion(3))
         apart: npt.NDArray[np.float64] = (wanted - found) / size
         return apart
 
-    x = wanted / size
+    x = np.where(terms, wanted / size, 0.0)
     for _ in range(_ROUNDS):
         off = missing(x)
-        slope = np.stack([(missing(x + _STEP * e) - off) / _STEP for e in np.eye(3)], axis=1)
+        slope = np.stack([(missing(x + _STEP * e) - off) / _STEP for e in np.eye(3)[free]], axis=1)
         if not (np.isfinite(slope).all() and np.isfinite(off).all()):
             break
-        step = np.linalg.lstsq(slope, -off, rcond=1e-9)[0]
+        step = np.zeros(3)
+        step[free] = np.linalg.lstsq(slope[free], -off[free], rcond=1e-9)[0]
         x = x + step
         if float(np.max(np.abs(step))) <= _CONVERGED * max(1.0, float(np.max(np.abs(x)))):
             asked: list[float] = (x * size).tolist()

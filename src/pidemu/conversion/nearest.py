@@ -67,6 +67,7 @@ def nearest(law: Law, target: Target, factor: float, process: Process | None = N
         [_middle(gains), _middle(times)],
         [math.log(gains[1] / gains[0]) / 2, math.log(times[1] / times[0]) / 2],
     )
+    in_order = target.form is Form.SERIES and not _is_out_of_order(law)
     best: tuple[float, float, float, float] | None = None
     for _ in range(_ROUNDS):
         K = _axis(center[0], width[0], gains)[:, None]
@@ -74,7 +75,7 @@ def nearest(law: Law, target: Target, factor: float, process: Process | None = N
         if not target.has_derivative:
             Td = np.zeros((1, 1))
         ki = _integral(m0, K, rates, target)
-        cost = _cost(target, sign, K, ki, Td, w, wanted)
+        cost = np.where(_in_order(K, ki, Td, in_order), _cost(target, sign, K, ki, Td, w, wanted), np.inf)
         i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
         if best is None or cost[i, j] < best[0]:
             best = (float(cost[i, j]), float(K[i, 0]), float(np.broadcast_to(ki, cost.shape)[i, 0]), float(Td[0, j]))
@@ -84,6 +85,17 @@ def nearest(law: Law, target: Target, factor: float, process: Process | None = N
         return None
     _, K_best, ki_best, Td_best = best
     return Numbers(sign * K_best, sign * ki_best, sign * K_best * Td_best)
+
+
+def _is_out_of_order(law: Law) -> bool:
+    """Whether the source is a series form whose derivative time is longer than its integral time."""
+    a = law.algorithm
+    return a.series and bool(a.kp and a.ki) and a.derivative_per_gain + a.Tf > abs(a.kp / a.ki)
+
+
+def _in_order(K: Any, ki: Any, Td: Any, wanted: bool) -> Any:
+    """Return where the integral time of a series form is no shorter than its derivative time, where that is wanted."""
+    return (Td * ki <= K * (1 + _MARGIN)) if wanted else True
 
 
 def _range(target: Target, role: Role) -> tuple[float, float]:

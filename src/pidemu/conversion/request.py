@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from pidemu.card.load import Card
+from pidemu.conversion.modes import Modes, read_mode
+from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
@@ -16,6 +18,8 @@ from pidemu.reading import signal_range
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
+
+Action = Literal["reverse", "direct"]
 
 
 @dataclass(frozen=True)
@@ -27,34 +31,50 @@ class Request:
     options, given : mapping
         Options and dials of the target that were named.
     scan : tuple of float or None
-        Scan intervals of source and target [s].
-    match : str or None
-        The match asked for.
+        Intervals at which source and target are executed [s].
+    pace : tuple of float
+        These intervals per those that the algorithms compute with.
+    mode, action, match, tag
+        As in `convert`.
     pv_range, op_range : tuple of float or None
-        New signal ranges of the target.
+        Signal ranges of the target.
     process : Process or None
         The process.
-    compensate, allow_approximate, round_dials : bool
+    digits : int or None
+        Digits to round to.
+    compensate, allow_approximate, assume : bool
         As in `convert`.
     """
 
     options: Mapping[str, object] = field(default_factory=dict)
     given: Mapping[str, object] = field(default_factory=dict)
     scan: tuple[float, float] | None = None
+    pace: tuple[float, float] = (1.0, 1.0)
+    mode: Modes = "both"
+    action: Action | None = None
     match: str | None = None
     pv_range: tuple[float, float] | None = None
     op_range: tuple[float, float] | None = None
     process: Process | None = None
-    compensate: bool = True
+    digits: int | None = None
+    compensate: bool = False
     allow_approximate: bool = False
-    round_dials: bool = False
+    assume: bool = False
+    tag: str = ""
 
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
         for name, value in {**self.options, **self.given}.items():
             yield from ("--set", f"{name}={exactly(value) if isinstance(value, float) else value}")
         if self.scan is not None:
-            yield from ("--scan", ",".join(exactly(h) for h in dict.fromkeys(self.scan)))
+            declared = tuple(h / r for h, r in zip(self.scan, self.pace, strict=True))
+            yield from ("--scan", _intervals(declared))
+            if self.pace != (1.0, 1.0):
+                yield from ("--runs-every", _intervals(self.scan))
+        if self.mode != "both":
+            yield from ("--mode", self.mode)
+        if self.action is not None:
+            yield from ("--action", self.action)
         for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
             if ends is not None:
                 yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
@@ -62,22 +82,40 @@ class Request:
             yield from ("--match", self.match)
         if self.process is not None:
             yield from ("--process", written(self.process))
-        flags = {
-            "--no-compensation": not self.compensate,
-            "--round": self.round_dials,
-            "--allow-approximate": self.allow_approximate,
-        }
+        if self.digits not in (None, DIGITS):
+            yield from ("--digits", str(self.digits))
+        if self.tag:
+            yield from ("--tag", self.tag)
+        flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
         yield from (flag for flag, wanted in flags.items() if wanted)
+
+
+DIGITS = 5
+"""Significant digits that the command line and the page print."""
+
+
+def _intervals(pair: tuple[float, ...]) -> str:
+    return ",".join(exactly(h) for h in dict.fromkeys(pair))
 
 
 def read_request(
     card: Card,
+    *,
     options: Mapping[str, object] | None,
     given: Mapping[str, object] | None,
     scan: object,
+    runs_every: object,
+    mode: object,
+    action: object,
     match: str | None,
     pv_range: object,
     op_range: object,
+    process: Process | None,
+    digits: object,
+    compensate: bool,
+    allow_approximate: bool,
+    assume: bool,
+    tag: str,
 ) -> Request:
     """Return what is asked for, checked; see `convert` for the arguments.
 
@@ -86,9 +124,9 @@ def read_request(
     Raises
     ------
     SettingError
-        A name comes twice, or a range is none.
+        A name comes twice, or a range, mode, action or number of digits is none.
     ScanError
-        A scan interval is no positive number.
+        A scan interval is not a positive number.
     """
     named: dict[str, object] = {}
     for name, value in [*(options or {}).items(), *(given or {}).items()]:
@@ -99,22 +137,56 @@ def read_request(
     spelled = {o.casefold(): o for o in card.options}
     chosen = {spelled.get(n.casefold(), n): x for n, x in named.items() if n.casefold() in spelled or n in (options or {})}
     dials = {n: x for n, x in named.items() if n.casefold() not in spelled and n not in (options or {})}
-    pv, op = signal_range(card, "pv_range", pv_range), signal_range(card, "op_range", op_range)
-    return Request(chosen, dials, _scans(scan), match, pv, op)
+    if action not in (None, "reverse", "direct"):
+        raise SettingError(f"action is '{action}'; it is reverse (the output falls when the measurement rises) or direct")
+    real, pace = _intervals_of(scan, runs_every)
+    return Request(
+        options=chosen,
+        given=dials,
+        scan=real,
+        pace=pace,
+        mode=read_mode(mode),
+        action="reverse" if action == "reverse" else "direct" if action == "direct" else None,
+        match=match,
+        pv_range=signal_range(card, "pv_range", pv_range),
+        op_range=signal_range(card, "op_range", op_range),
+        process=process,
+        digits=checked_digits(digits),
+        compensate=compensate,
+        allow_approximate=allow_approximate,
+        assume=assume,
+        tag=tag,
+    )
 
 
-def _scans(scan: object) -> tuple[float, float] | None:
-    """Return the scan intervals of source and target [s]."""
-    if scan is None:
+def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float] | None, tuple[float, float]]:
+    """Return the intervals at which both are executed [s], and these per the intervals they compute with.
+
+    Of an interval that is stated once only, it is taken that it is both. The target is timed rightly unless its own real interval is
+    given: it computes with its scan interval or, where none is given, with the one at which the source runs.
+    """
+    declared, real = (_one_or_two(x, name) for x, name in ((scan, "scan"), (runs_every, "runs_every")))
+    if real is None:
+        return (None if declared is None else (declared[0], declared[-1])), (1.0, 1.0)
+    source = real[0] if declared is None else declared[0]
+    target = declared[1] if declared is not None and len(declared) == 2 else real[0]
+    target_real = real[1] if len(real) == 2 else target
+    return (real[0], target_real), (real[0] / source, target_real / target)
+
+
+def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
+    """Return one or two intervals [s]."""
+    if given is None:
         return None
-    pair: tuple[float, ...] = ()
+    found: tuple[float, ...] = ()
     try:
-        if isinstance(scan, Real) and not isinstance(scan, bool):
-            pair = (float(scan), float(scan))
-        elif not isinstance(scan, bool):
-            pair = tuple(float(h) for h in scan)  # type: ignore[attr-defined]
+        if isinstance(given, Real) and not isinstance(given, bool):
+            found = (float(given),)
+        elif not isinstance(given, bool | str):
+            found = tuple(float(h) for h in given)  # type: ignore[attr-defined]
+            found = found if len(found) == 2 else ()
     except (TypeError, ValueError):
-        pair = ()
-    if len(pair) != 2 or not all(math.isfinite(h) and h > 0 for h in pair):
-        raise ScanError(f"scan is {scan!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
-    return pair[0], pair[1]
+        found = ()
+    if not found or not all(math.isfinite(h) and h > 0 for h in found):
+        raise ScanError(f"{name} is {given!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
+    return found

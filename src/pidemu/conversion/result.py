@@ -11,8 +11,13 @@ from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
 from pidemu.conversion.aim import Match
-from pidemu.conversion.choices import Attempt
+from pidemu.conversion.beside import Beside, runner_up, stands_beside
+from pidemu.conversion.command import words_for
+from pidemu.conversion.conditions import Condition, conditions_of
+from pidemu.conversion.modes import Mode
+from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
+from pidemu.conversion.unstated import Open
 from pidemu.plain import json_safe
 from pidemu.settings import Settings
 
@@ -20,7 +25,7 @@ if TYPE_CHECKING:
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
-_SCAN_RULES: Final = ("integral.rule", "derivative.rule", "derivative.filter.rule")
+MODES: Final[tuple[Mode, Mode]] = ("auto", "cascade")
 
 
 @dataclass(frozen=True)
@@ -49,9 +54,11 @@ class Conversion:
     Attributes
     ----------
     source, settings : Settings
-        The source's and the target's settings.
+        The source's and the target's settings, the latter as they are printed.
+    unrounded : Settings
+        The target's settings before rounding.
     match : str
-        How they were found: exact, low-frequency, textbook, frequency, loop or constrained.
+        How they were found: exact, same-numbers, low-frequency, textbook, frequency, loop or constrained.
     certificate : Certificate
         How near they are.
     textbook : Textbook
@@ -61,21 +68,24 @@ class Conversion:
     refusal : str
         Why the target refused, where these are only the nearest settings.
     chosen : dict of str to str
-        Options of the target that were chosen here, because nobody gave them, and are not as the card delivers them.
+        Options of the target that were chosen here, because they were not stated, and are not as the card delivers them.
     ranking : tuple of Attempt
         The choices of the options that were looked at, the best first.
     factor : float
         What the source's gain was multiplied by for new signal ranges; negative where the action changes.
     scan : tuple of float or None
-        Scan intervals of source and target [s].
+        Intervals at which source and target are executed [s].
     process : Process or None
         The process, where it was given.
     request : Request
         What was asked for.
+    opens : tuple of Open
+        What was not stated of the source.
     """
 
     source: Settings
     settings: Settings
+    unrounded: Settings
     match: Match
     certificate: Certificate
     textbook: Textbook
@@ -87,16 +97,49 @@ class Conversion:
     scan: tuple[float, float] | None = None
     process: Process | None = None
     request: Request = field(default_factory=Request)
+    opens: tuple[Open, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
-        """``exact``, ``exact-feedback`` or ``approximate``."""
+        """``exact``, ``exact-feedback`` or ``approximate``; where both modes count, the worse of the two."""
         return self.certificate.verdict
 
     @property
+    def verdicts(self) -> dict[str, Verdict]:
+        """The verdict by mode, where it depends on the mode; else that of the modes looked at alone."""
+        if self.certificate.setpoint_in_cascade is not None:
+            return {mode: self.certificate.verdict_in(mode) for mode in MODES}
+        return {self.request.mode: self.verdict}
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """On which unverified facts of the cards the result rests, with what else it would be."""
+        return conditions_of(self)
+
+    @cached_property
+    def beside(self) -> tuple[Beside, ...]:
+        """Other settings worth a line: the runner-up, the source's own numbers, settings compensated for the scans."""
+        return tuple(stands_beside(self))
+
+    @cached_property
+    def runner_up(self) -> Beside | None:
+        """The best settings with other options, where they are no worse; ``None`` where there are none."""
+        return runner_up(self)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was taken though it should have been asked, because the user wanted it so."""
+        return tuple(f"{o.about} = {o.taken.value}" for o in self.opens if o.asked)
+
+    @property
     def sentence(self) -> str:
-        """The verdict in one sentence for whoever stands at the loop."""
-        return sentence(self.certificate)
+        """The verdict in a sentence or two for whoever stands at the loop, with the conditions that it rests on."""
+        return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed)
+
+    @cached_property
+    def command(self) -> str:
+        """The command that makes the conversion again."""
+        return words_for(self.source, self.settings.card, self.request)
 
     @cached_property
     def setpoint_filter(self) -> SetpointFilter | None:
@@ -122,29 +165,19 @@ class Conversion:
         law = [text for a, text in found if a.makes_the_law]
         return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
 
-    @property
-    def law_assumptions(self) -> tuple[str, ...]:
-        """Those of `assumptions` that the settings rest on: what makes the law and, where these make up for scans, scan rules."""
-        cost = self.certificate.scan_cost
-        rules = _SCAN_RULES if cost is not None and cost.compensated else ()
-        found = [(s, a) for s in (self.source, self.settings) for a in s.assumptions() if a.makes_the_law or a.path in rules]
-        return tuple(dict.fromkeys(f"{s.card.id}: {a}" for s, a in found))
-
-    @property
-    def inferences(self) -> tuple[str, ...]:
-        """What of the two equations is inferred from something documented, not itself stated."""
-        found = [f"{s.card.id}: {a}" for s in (self.source, self.settings) for a in s.inferences()]
-        return tuple(dict.fromkeys(found))
-
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json``."""
         plain = {
             "from": self.source.to_dict(),
-            "to": self.settings.to_dict(),
+            "to": self._target_dict(),
             "match": self.match,
             "verdict": self.verdict,
+            "verdicts": self.verdicts,
             "sentence": self.sentence,
+            "conditions": [c.to_dict() for c in self.conditions],
             "chosen": dict(self.chosen),
+            "runner_up": None if self.runner_up is None else self.runner_up.to_dict(),
+            "beside": [b.to_dict() for b in self.beside],
             "ranking": [attempt.to_dict() for attempt in self.ranking],
             "certificate": self.certificate.to_dict(),
             "textbook": {
@@ -159,7 +192,14 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
-            "inferences": list(self.inferences),
+            "command": self.command,
         }
         safe: dict[str, Any] = json_safe(plain)
         return safe
+
+    def _target_dict(self) -> dict[str, Any]:
+        """Return the target's settings, with their values before rounding."""
+        plain = self.settings.to_dict()
+        for name, dial in plain["settings"].items():
+            dial["unrounded"] = self.unrounded[name].value
+        return plain

@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from pidemu.algorithm import Algorithm
-from pidemu.card.base import Rule
-from pidemu.certificate.linear import bands, certify, deviation, scan_phase
-from pidemu.certificate.models import EXACT, Certificate, ScanCost
-from pidemu.certificate.scanwise import common_interval
+from pidemu.card.base import Rule, Status
+from pidemu.certificate.linear import bands, certify, compare_paths, deviation
+from pidemu.certificate.models import Certificate, Kick, ScanCost
+from pidemu.certificate.scan_cost import scan_cost
 from pidemu.conversion import match as closed
 from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.closed_forms import ClosedForms
+from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.modes import Mode, Modes, law_in, looked_at
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
 from pidemu.conversion.nearest import USELESS, nearest
+from pidemu.conversion.noise import noise_is_alike
 from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import ScanError, SettingError
 from pidemu.settings import Settings
@@ -27,16 +30,18 @@ if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
 _FILTER_ROUNDS = 12
-_WHOLE = 0.99
-"""Share of the loop band above which nothing of it counts as lost."""
 _LEAST = {Rule.TRAPEZOIDAL: 0.5, Rule.FORWARD: 1.0, Rule.LAGGED_DIFFERENCE: 0.5}
 """Filter time in scan intervals below which a rule rings, or hardly leaves a derivative."""
 _CLEARLY = 1e-6
 """Relative amount by which a deviation must be smaller to count."""
+_NEAR, _NEAR_ENOUGH = 0.01, 0.02
+"""Deviation in the loop band below which the source's own numbers are kept; the second where its filter is only assumed."""
+_FAR = 0.05
+"""Deviation in the loop band from which the same moments are no longer near."""
 
 
 class Solver:
-    """One conversion under way.
+    """One conversion under way: one choice of the target's options.
 
     Parameters
     ----------
@@ -52,6 +57,8 @@ class Solver:
         The process, where the user states it.
     compensate : bool
         Whether the settings shall make up for scan intervals and rules that differ.
+    mode : {"auto", "cascade", "both"}
+        The modes in which the setpoint path counts; where it is another one in each, weights are matched in automatic.
     """
 
     def __init__(
@@ -62,16 +69,19 @@ class Solver:
         scans: tuple[float, float] | None,
         process: Process | None = None,
         *,
-        compensate: bool = True,
+        compensate: bool = False,
+        mode: Modes = "both",
     ) -> None:
         self.source = source
         self.target = target
         self.factor = factor
         self.scans = scans
         self.process = process
-        self.forms = ClosedForms(source, target, factor)
+        self.mode = mode
+        self.first_mode: Mode = "cascade" if mode == "cascade" else "auto"
+        self.forms = ClosedForms(source, target, factor, self.first_mode)
         self.law = self.forms.law
-        self.at_source_scan = source.law(scans[0]) if scans else None
+        self.at_source_scan = law_in(source, self.first_mode, scans[0]) if scans else None
         self.filter_is_free = target.filter.free
         self.compensates = compensate and scans is not None
         """Whether targets are matched as a process sees them, sampled and held."""
@@ -95,21 +105,14 @@ class Solver:
             return self._nearest(), reason
         return None, f"{reason}; no settings of it come near"
 
-    def rules_differ(self, settings: Settings) -> bool:
-        """Whether nobody gave scan intervals, and equal laws would differ at an equal interval by their scan rules."""
-        if self.scans is not None:
-            return False
-        try:
-            h = common_interval(self.source, settings)
-        except ScanError:
-            return True
-        band = bands(self.law, h, self.process)[0]
-        return deviation(self.source.law(h), settings.law(h), band, self.factor) > EXACT
-
     def _by(self, aim: Aim) -> tuple[Settings, Match]:
         match aim.match:
+            case None:
+                return self._default()
             case "textbook":
                 return self.forms.textbook(), "textbook"
+            case "same-numbers":
+                return self.forms.own_numbers(), "same-numbers"
             case "constrained":
                 return self._nearest(), "constrained"
             case "frequency":
@@ -118,39 +121,87 @@ class Solver:
                 assert self.process is not None
                 process = self.process
                 return self._through(lambda p, m: in_loop(p, m, process)), "loop"
-        return self.closed(aim.match)
+        return self._compensated(*self.forms.solve(aim.match), aim.match)
+
+    def _default(self) -> tuple[Settings, Match]:
+        """Return the settings that nobody asked otherwise for (specs/equations.md, section 9, choices).
+
+        The same law where the target has it; else the source's own numbers where they are nearly that; else the same moments while
+        these are near, and beyond that the least largest deviation.
+        """
+        why: NoMatchError | SettingError
+        try:
+            return self._compensated(self.forms.exact(), "exact", None)
+        except (NoMatchError, SettingError) as error:
+            why = error
+        own = self._own_numbers()
+        if own is not None:
+            return self._compensated(own, "same-numbers", None)
+        self.target.filter = self.forms.original_filter
+        try:
+            settings, how = self.forms.low_frequency(), "low-frequency"
+        except (NoMatchError, SettingError) as error:
+            raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
+        if self.forms.certify(settings).feedback.is_exact:
+            return self._compensated(settings, "exact", None)
+        return self._compensated(*self._nearer(settings), None)
+
+    def _own_numbers(self) -> Settings | None:
+        """Return the source's own numbers where they are good enough: near in the loop band, and alike for noise."""
+        self.target.filter = self.forms.original_filter
+        try:
+            own = self.forms.own_numbers()
+        except (NoMatchError, SettingError):
+            return None
+        least = _NEAR if filter_status(self.source) is not Status.ASSUMED else _NEAR_ENOUGH
+        near = self.continuous_deviation(own) < least
+        return own if near and noise_is_alike(self.law, law_in(own, self.first_mode), self.factor) else None
 
     def certify(self, settings: Settings) -> Certificate:
         """Return the linear figures of settings of the target."""
         at_scan = None
         if self.scans and self.at_source_scan:
-            at_scan = (self.at_source_scan, settings.law(self.scans[1]))
-        return certify(self.law, settings.law(), at_scan, self.factor, self.process)
+            at_scan = (self.at_source_scan, law_in(settings, self.first_mode, self.scans[1]))
+        found = certify(self.law, law_in(settings, self.first_mode), at_scan, self.factor, self.process)
+        others = looked_at(self.mode, self.source, settings)[1:]
+        if others:
+            limits = bands(self.law, max(self.scans) if self.scans else None, self.process)
+            laws = {mode: (law_in(self.source, mode), law_in(settings, mode)) for mode in others}
+            found = replace(
+                found,
+                setpoint_in_cascade=compare_paths(*laws["cascade"], "setpoint", limits, self.factor),
+                kick_in_cascade=Kick(self.factor * laws["cascade"][0].kick(), laws["cascade"][1].kick()),
+            )
+        return found
 
     def deviation(self, settings: Settings) -> float:
-        """Return the largest deviation of the feedback path in the loop band; at the scans, where these are given."""
-        band = bands(self.law, max(self.scans) if self.scans else None, self.process)[0]
-        if self.scans and self.at_source_scan:
+        """Return the largest deviation of the feedback path in the loop band; at the scans, where these are compensated for."""
+        if self.compensates and self.scans and self.at_source_scan:
+            band = bands(self.law, max(self.scans), self.process)[0]
             return deviation(self.at_source_scan, settings.law(self.scans[1]), band, self.factor)
+        return self.continuous_deviation(settings)
+
+    def continuous_deviation(self, settings: Settings) -> float:
+        """Return the largest deviation of the continuous feedback paths in the loop band."""
+        band = bands(self.law, max(self.scans) if self.scans else None, self.process)[0]
         return deviation(self.law, settings.law(), band, self.factor)
 
-    def scan_cost(self, settings: Settings, how: Match) -> ScanCost | None:
-        """Return what the scan intervals cost, with the settings of the continuous law and with these, that were found so."""
-        if self.scans is None:
-            return None
-        end, whole = (bands(self.law, h, self.process)[0][1] for h in (max(self.scans), None))
-        plain = settings
-        if how not in ("textbook", "constrained"):  # these know nothing of scans
-            with suppress(NoMatchError, SettingError):
-                plain = self._continuous().closed(None)[0]
-        cost = self._deviation_if_stable(plain)
-        return ScanCost(end, scan_phase(end, self.scans), plain != settings, cost, cut=end < _WHOLE * whole)
+    def distance(self, settings: Settings) -> float:
+        """Return by what settings are judged: the change of Ms with a process, else the deviation in the loop band."""
+        if self.process is None:
+            return self.continuous_deviation(settings)
+        from pidemu.loop.figures import loop_figures
 
-    def _continuous(self) -> Solver:
-        """Return the solver of the same conversion without compensation."""
-        target = copy(self.target)
-        target.filter = self.forms.original_filter
-        return Solver(self.source, target, self.factor, self.scans, self.process, compensate=False)
+        old, new = (loop_figures(law, self.process, f).Ms for law, f in ((self.law, self.factor), (settings.law(), 1.0)))
+        if not (math.isfinite(old) and math.isfinite(new)):
+            return self.continuous_deviation(settings)
+        return abs(new / old - 1)
+
+    def scan_cost(self, settings: Settings) -> ScanCost | None:
+        """Return what the scan intervals cost, at the crossover of the loop or where it usually lies."""
+        if self.scans is None or self.at_source_scan is None:
+            return None
+        return scan_cost(self.at_source_scan, settings.law(self.scans[1]), self.factor, self.process)
 
     def _nearest(self) -> Settings:
         # nothing imitates a missing proportional term
@@ -178,40 +229,27 @@ class Solver:
             raise SettingError(f"the source's crossover, {found:g} rad/s, is beyond half the scan rate; match at a lower frequency")
         return found
 
-    def closed(self, match: Match | None) -> tuple[Settings, Match]:
-        """Return the target's settings by a closed form, or by one that is bent to the scans, and which.
-
-        Raises
-        ------
-        NoMatchError, SettingError
-            There is none, or it leaves the target's ranges.
-        """
-        settings, how = self.forms.solve(match)
-        if self.compensates and not self._runs_exactly(settings):
-            settings, how = self._at_scans(settings, match)
-        if how != "low-frequency" or match is not None:
+    def _compensated(self, settings: Settings, how: Match, match: Match | None) -> tuple[Settings, Match]:
+        """Return settings that make up for the scans, where that is asked for and brings them nearer; else the given ones."""
+        if not self.compensates or self._runs_exactly(settings):
             return settings, how
-        settings, how = self._not_behind_the_textbook(settings)
-        notched = not self.forms.scaled.algorithm.kp  # integral and derivative alone cancel at one frequency: no measure there
-        if self.scans is None and not notched and self.deviation(settings) >= USELESS:
-            raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all")
-        return settings, how
-
-    def _at_scans(self, settings: Settings, match: Match | None) -> tuple[Settings, Match]:
-        """Return settings whose sampled, held law has the source's moments; where these are not nearer, the given ones."""
         with suppress(NoMatchError, SettingError, ScanError):
             bent = self._through(self._met, settings, derivative=bool(self.forms.scaled.algorithm.kd))
-            if self.deviation(bent) < self._deviation_if_stable(settings) * (1 - _CLEARLY):
-                settings = bent
-        if self.certify(settings).headline.is_exact:
-            return settings, "exact"
-        if match == "exact":
+            if self.deviation(bent) < self._deviation_if_stable(settings) * (1 - _CLEARLY) and self._keeps_signs(bent):
+                return bent, "low-frequency"
+        if match == "exact" and how != "exact":
             raise NoMatchError("no settings give the same law at these scan intervals and rules")
-        return settings, "low-frequency"
+        return settings, how
+
+    def _keeps_signs(self, settings: Settings) -> bool:
+        """Whether every term pushes the way the source's does: making up for scans never turns a derivative round."""
+        old, new = self.forms.scaled.algorithm, settings.algorithm()
+        return all(x * y >= 0 for x, y in ((old.kp, new.kp), (old.ki, new.ki), (old.kd, new.kd)))
 
     def _runs_exactly(self, settings: Settings) -> bool:
         try:
-            return self.certify(settings).verdict == "exact"
+            at_scan = self.certify(settings).feedback_at_scan
+            return at_scan is not None and at_scan.is_exact
         except ScanError:
             return False
 
@@ -224,9 +262,11 @@ class Solver:
 
     def _met(self, problem: Problem, start: Sequence[float]) -> Sequence[float]:
         """Return moments that `meet` the source's, with a free filter set so that the next moment agrees too, as far as it can."""
+        a = self.forms.scaled.algorithm
+        terms = bool(a.ki), bool(a.kp), bool(a.kd)
         if self.filter_is_free:
             self._start_with_a_usable_filter(problem.numbers(start), problem.scan)
-        asked = meet(problem)
+        asked = meet(problem, terms)
         for _ in range(_FILTER_ROUNDS if self.filter_is_free else 0):
             law, kept = problem.law(asked), self.target.filter
             kd, Tf = law.algorithm.kd, law.algorithm.Tf
@@ -236,7 +276,7 @@ class Solver:
             wanted = self._usable(Tf + apart / kd, law.algorithm, law.scan)  # m3 holds -kd Tf
             try:
                 self.target.filter = kept.nearest_to(wanted, self.target.filter_base(problem.numbers(asked)))
-                asked = meet(problem)
+                asked = meet(problem, terms)
             except NoMatchError:
                 self.target.filter = kept
                 break
@@ -266,16 +306,28 @@ class Solver:
             at_scan = (self.at_source_scan, self.scans[1])
         return self.forms.through(solve, start or self.forms.solve(None)[0], at_scan, derivative=derivative)
 
-    def _not_behind_the_textbook(self, settings: Settings) -> tuple[Settings, Match]:
-        """Return these or, where the textbook rule is nearer in the loop band or they are useless, what is nearest there."""
-        found: list[tuple[float, Match, Settings]] = [(self.deviation(settings), "low-frequency", settings)]
-        own = found[0][0] * (1 - _CLEARLY)
+    def _nearer(self, settings: Settings) -> tuple[Settings, Match]:
+        """Return settings of the same moments or, where these are far off, what comes nearest.
+
+        Raises
+        ------
+        NoMatchError
+            Everything is as far off as no controller at all.
+        """
+        found: list[tuple[float, Match, Settings]] = [(self.distance(settings), "low-frequency", settings)]
+        off = self.continuous_deviation(settings)
         with suppress(NoMatchError, SettingError):
             book = self.forms.weighted(self.forms.textbook_numbers())
-            found += [(self._deviation_if_stable(book), "textbook", book)]
-        if own >= USELESS or found[-1][0] < own:
+            found.append((self.distance(book), "textbook", book))
+        a = self.forms.scaled.algorithm
+        unfiltered = bool(a.kd) and not a.Tf
+        nearer = found[-1][0] < found[0][0] * (1 - _CLEARLY)
+        if off >= USELESS or (off > _FAR and not unfiltered) or nearer:
             with suppress(SettingError):
                 near = self._nearest()
-                found += [(self._deviation_if_stable(near), "constrained", near)]
+                found.append((self.distance(near), "constrained", near))
         _, how, best = min(found, key=lambda f: f[0] if f[1] == "low-frequency" else f[0] * (1 + _CLEARLY))
+        notched = not a.kp  # integral and derivative alone cancel at one frequency: no measure there
+        if not notched and self.continuous_deviation(best) >= USELESS:
+            raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all")
         return best, how

@@ -141,6 +141,8 @@ class Target:
         Dials that the user has fixed.
     pv_range, op_range : tuple of float, optional
         Signal ranges.
+    pace : float
+        Interval at which the target is really executed per the one that it computes with; see `Settings.pace`.
     """
 
     def __init__(
@@ -150,8 +152,10 @@ class Target:
         given: Mapping[str, object],
         pv_range: tuple[float, float] | None,
         op_range: tuple[float, float] | None,
+        pace: float = 1.0,
     ) -> None:
         self.card = card
+        self.pace = pace
         self.variant: Variant = card.variant(options)
         self.options = dict(options)
         self.given = dict(given)
@@ -216,11 +220,12 @@ class Target:
         shape = {"lead_lag": filt.applies_to == "lead-lag", "effective": filt.of == "effective-derivative"}
         shape["needed"] = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
         if not isinstance(given, str):
-            return TargetFilter(kind, None, False, float(given or 0.0), **shape)
+            return TargetFilter(kind, None, False, float(given or 0.0) * (self.pace if kind == "time" else 1.0), **shape)
         setting = self.variant.equation.settings[given]
         role, unit = Role(setting.sets), parse_unit(setting.unit)
-        low, high = (to_canonical(role, x, unit) for x in limits(setting))
-        present = self.template()[given].canonical
+        pace = self.pace if kind == "time" else 1.0
+        low, high = (to_canonical(role, x, unit) * pace for x in limits(setting))
+        present = self.template()[given].canonical * pace
         return TargetFilter(kind, given, self.is_free(given, setting), present, low=low, high=high, **shape)
 
     @cached_property
@@ -235,7 +240,7 @@ class Target:
             if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
                 undefined = setting.sets == "derivative" and self.form is Form.SERIES and not self.has_proportional
                 values[name] = (*off_values(setting), 0.0)[0] if undefined else _placeholder(setting)
-        return self.card.settings({**self.variant.chosen, **values, **self.ranges})
+        return replace(self.card.settings({**self.variant.chosen, **values, **self.ranges}), pace=self.pace)
 
     def settings(self, n: Numbers) -> Settings:
         """Return the target's settings for canonical numbers.
@@ -245,7 +250,8 @@ class Target:
         SettingError
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
-        return self.card.settings({**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges})
+        dials = {**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges}
+        return replace(self.card.settings(dials), pace=self.pace)
 
     def _idle(self) -> dict[str, object]:
         """Return values for filter and weights that have no default, where nothing depends on them."""
@@ -284,6 +290,7 @@ class Target:
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
+        rate, time = rate * self.pace, time / self.pace
         sign = gain_sign(self.variant.equation)  # a parallel form carries it on every gain, the others on one
         each = sign if parallel else 1.0
         wanted = [
@@ -300,7 +307,7 @@ class Target:
                 dials[dial[0]] = self._in_reach(*dial, self._to_dial(*dial, value))
         if n.Tf is not None and self.filter.setting is not None:
             base = time / (1 + rate * time) if self.filter.effective else time
-            dials.update(self._filter_dial(n.Tf, base))
+            dials.update(self._filter_dial(n.Tf, base * self.pace))
         return dials
 
     def _in_reach(self, name: str, setting: Setting, value: float) -> float:
@@ -340,7 +347,7 @@ class Target:
         assert f.setting is not None
         setting = self.variant.equation.settings[f.setting]
         if f.kind == "time":
-            return {f.setting: self._in_reach(f.setting, setting, self._to_dial(f.setting, setting, Tf))}
+            return {f.setting: self._in_reach(f.setting, setting, self._to_dial(f.setting, setting, Tf / self.pace))}
         if base == 0:
             return {}
         if f.kind == "ratio":

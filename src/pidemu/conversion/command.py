@@ -4,28 +4,39 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.conversion.result import Conversion
+from pidemu.conversion.request import Request
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
+from pidemu.settings import Settings
+
+if TYPE_CHECKING:
+    from pidemu.conversion.result import Conversion
 
 
 def command_for(c: Conversion) -> str:
     """Return the ``pidemu convert`` command that gives the same settings, for a shell."""
-    return shlex.join(_words(c))
+    return words_for(c.source, c.settings.card, c.request)
 
 
-def _words(c: Conversion) -> Iterator[str]:
-    source = c.source
+def words_for(source: Settings, target: Card, request: Request) -> str:
+    """Return the ``pidemu convert`` command for a source, a target and what is asked for, for a shell."""
+    return shlex.join(_words(source, target, request))
+
+
+def _words(source: Settings, target: Card, request: Request) -> Iterator[str]:
     yield from ("pidemu", "convert", name_of(source.card))
-    yield from (f"{n}={exactly(v.value)}" for n, v in source.items() if v.given)
+    for n, v in source.items():
+        if v.given:
+            yield f"{n}={v.typed if isinstance(v.typed, str) else exactly(v.value)}"
     yield from (f"{n}={x}" for n, x in source.options.items() if n not in source.defaulted)
     for name, ends in (("pv", source.pv_range), ("op", source.op_range)):
         if ends is not None:
             yield f"--{name}-range={exactly(ends[0])},{exactly(ends[1])}"
-    yield from ("--to", name_of(c.settings.card), *c.request.words())
+    yield from ("--to", name_of(target), *request.words())
 
 
 def name_of(card: Card) -> str:

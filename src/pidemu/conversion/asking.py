@@ -1,0 +1,71 @@
+"""Asking: what each answer to a question would give, and the error that holds it (specs/equations.md, section 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pidemu.card.load import Card
+from pidemu.conversion.command import words_for
+from pidemu.conversion.modes import depends_on_mode
+from pidemu.conversion.options import Attempt
+from pidemu.conversion.questions import Answer, Question
+from pidemu.conversion.request import DIGITS, Request
+from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
+from pidemu.settings import Settings
+
+
+def ask(questions: Sequence[Question], source: Settings, card: Card, request: Request) -> None:
+    """Raise the questions with what their answers would give, unless the defaults are to be taken.
+
+    Raises
+    ------
+    QuestionError
+        There are questions.
+    """
+    if questions and not request.assume:
+        raise QuestionError(
+            [replace(q, readings=tuple(_worked_out(a, source, card, request) for a in q.readings)) for q in questions]
+        )
+
+
+def _worked_out(answer: Answer, source: Settings, card: Card, request: Request) -> Answer:
+    """Return an answer with its conversion, and the command that states it."""
+    from pidemu.conversion.convert import converted  # a question is answered by converting
+
+    try:
+        read = replace(source.changed(answer.given), pace=1.0) if answer.given else replace(source, pace=1.0)
+        asked = replace(request, **{**answer.asked, "assume": True, "digits": request.digits or DIGITS})
+        command = words_for(read, card, replace(request, **answer.asked))
+    except PidemuError as error:
+        return replace(answer, outcome=str(error))
+    try:
+        return replace(answer, command=command, conversion=converted(read, card, asked, emulate=False))
+    except ConversionRefusedError as refusal:
+        return replace(answer, command=command, outcome=f"refused: {refusal}")
+    except PidemuError as error:
+        return replace(answer, command=command, outcome=str(error))
+
+
+def mode_is_open(source: Settings, ranking: tuple[Attempt, ...], request: Request) -> bool:
+    """Whether the source is another equation in cascade, both modes count, and no choice of the target holds in both."""
+    if request.mode != "both" or not depends_on_mode(source):
+        return False
+    return all(attempt.merit is None or attempt.merit.setpoint for attempt in ranking)
+
+
+def mode_question(source: Settings) -> Question:
+    """Return the question for the mode in which a loop runs."""
+    text = (
+        f"{source.card.id}: the equation depends on the mode (in cascade other terms see the setpoint than in automatic), and no choice "
+        "of the target's options does the same in both. In which mode does the loop run?"
+    )
+    return Question(
+        "mode",
+        "mode",
+        text,
+        (
+            Answer("auto", "the operator sets the setpoint", asked={"mode": "auto"}),
+            Answer("cascade", "another controller sets the setpoint", asked={"mode": "cascade"}),
+        ),
+    )

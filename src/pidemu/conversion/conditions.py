@@ -1,0 +1,197 @@
+"""On which unverified facts a result rests, and how far it could be off: the conditions of a verdict (specs/equations.md, section 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from pidemu.card.base import Form, Status
+from pidemu.card.load import Statement
+from pidemu.card.models import Equation
+from pidemu.card.terms import Filter
+from pidemu.certificate.figures import number, percent
+from pidemu.errors import PidemuError
+from pidemu.settings import Settings
+from pidemu.units import Role
+
+if TYPE_CHECKING:
+    from pidemu.conversion.result import Conversion
+
+_RATIOS: Final = (0.05, 0.2)
+"""Usual filter times per derivative time, from which a fact that is only assumed is varied."""
+_USUAL: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Condition:
+    """An unverified fact that a result rests on.
+
+    Attributes
+    ----------
+    card : str
+        The card whose fact it is.
+    path : str
+        The field of the card, such as ``derivative.filter.ratio``.
+    status : str
+        ``assumed`` or ``inferred``.
+    text : str
+        The fact, to stand behind "if".
+    why : str
+        What the card says of it.
+    spread : str
+        What else the result would be, over the usual values; empty where that is not known.
+    headline : bool
+        Whether the verdict itself rests on it.
+    """
+
+    card: str
+    path: str
+    status: str
+    text: str
+    why: str = ""
+    spread: str = ""
+    headline: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.status})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values for JSON."""
+        return {
+            "card": self.card, "path": self.path, "status": self.status, "text": self.text, "why": self.why, "spread": self.spread,
+            "headline": self.headline,
+        }  # fmt: skip
+
+
+def conditions_of(c: Conversion) -> tuple[Condition, ...]:
+    """Return the conditions of a conversion's verdict, what is assumed before what is inferred."""
+    found = [*_of(c, c.source, is_source=True), *_of(c, c.settings, is_source=False)]
+    seen = {x.text: x for x in reversed(found)}
+    ordered = [x for x in found if seen[x.text] is x]
+    return tuple(sorted(ordered, key=lambda x: (not x.headline, x.status != Status.ASSUMED)))
+
+
+def _of(c: Conversion, s: Settings, *, is_source: bool) -> Iterator[Condition]:
+    if s.card.data.kind == "equation":
+        return
+    a, found = s.algorithm(), {}
+    for statement in s.variant.statements():
+        evidence = statement.evidence
+        if evidence is None or evidence.status not in (Status.ASSUMED, Status.INFERRED) or statement.path not in _MATTER:
+            continue
+        if statement.path.startswith("derivative") and not a.kd:
+            continue
+        words = _in_words(statement, s, _name(s))
+        rank = _MATTER.index(statement.path)
+        if words is not None and (statement.key not in found or rank < found[statement.key][0]):
+            found[statement.key] = rank, statement, words
+    for _, statement, words in found.values():
+        assert statement.evidence is not None
+        yield Condition(
+            s.card.id, statement.path, statement.evidence.status.value, words, statement.evidence.note or "",
+            _spread(c, s, statement, is_source=is_source), headline=statement.is_assumed or not statement.path.endswith("on"),
+        )  # fmt: skip
+
+
+_LONG: Final = 24
+_MATTER: Final = (
+    "derivative.filter.ratio", "derivative.filter.gain", "derivative.filter.time", "form", "proportional.on", "derivative.on",
+    "derivative.filter.applies-to", "cascade.proportional.on",
+)  # fmt: skip
+"""Fields that make the law and that a verdict may rest on; of those with one evidence the first is named."""
+
+
+def _name(s: Settings) -> str:
+    """Return what to call a controller in a sentence: its product where that is short, else the card."""
+    product = s.card.data.product.split(" (")[0]
+    return product if len(product) < _LONG else s.card.id
+
+
+def _in_words(statement: Statement, s: Settings, name: str) -> str | None:
+    """Return the fact in words; ``None`` where the result does not depend on it."""
+    e, a = s.equation, s.algorithm()
+    filt = e.derivative.filter
+    rate = next((n for n, v in s.items() if v.role is Role.DERIVATIVE and v.active), "the derivative time")
+    match statement.path:
+        case "form":
+            return f"{name} is of {e.form.value} form" if a.kd else None
+        case "derivative.filter.ratio" if filt is not None and isinstance(filt.ratio, float | int):
+            return f"{name}'s derivative filter is {rate}/{number(1 / filt.ratio)}"
+        case "derivative.filter.gain" if filt is not None and isinstance(filt.gain, float | int):
+            return f"{name}'s derivative filter is {rate}/{number(filt.gain)}"
+        case "derivative.filter.time" if filt is not None and isinstance(filt.time, float | int):
+            return f"{name}'s derivative filter is {number(filt.time)} s"
+        case "derivative.filter.applies-to" if filt is not None:
+            return f"{name}'s derivative filter is {_PLACES[filt.applies_to]}"
+        case "derivative.on" if filt is None and statement.key == "derivative" and statement.is_assumed:
+            return f"{name} has no derivative filter"
+        case "proportional.on" if a.kp:
+            return f"P of {name} acts on the {_ON[e.proportional.on]}"
+        case "derivative.on" if a.kd:
+            return f"D of {name} acts on the {_ON[e.derivative.on]}"
+        case "cascade.proportional.on":
+            return f"P of {name} acts on the {_ON[e.cascade.proportional.on]} in cascade" if e.cascade else None
+    return None
+
+
+_PLACES: Final = {
+    "term": "on the derivative term alone", "lead-lag": "the lag of a lead-lag", "measurement": "on the whole measurement",
+    "output": "on the output",
+}  # fmt: skip
+_ON: Final = {"error": "error", "pv": "measurement", "weighted": "weighted error", "none": "nothing"}
+
+
+def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool) -> str:
+    """Return what else would come out over the usual values of a fact."""
+    if statement.path == "form":
+        other = Form.SERIES if s.equation.form is Form.STANDARD else Form.STANDARD
+        if s.equation.form is Form.PARALLEL:
+            return ""
+        return _result(c, s, f"if it is {_FORMS[other]}", lambda e: e.model_copy(update={"form": other}), is_source=is_source)
+    if statement.path == "derivative.filter.ratio":
+        texts = [
+            _result(c, s, f"with {ratio:g}", lambda e, r=ratio: _with_filter(e, ratio=r), is_source=is_source)  # type: ignore[misc]
+            for ratio in _RATIOS
+        ]
+        return "; ".join(t for t in texts if t)
+    if statement.path == "derivative.on" and s.equation.derivative.filter is None and statement.is_assumed:
+        return _result(
+            c, s, f"with a filter of {_USUAL:g} of the derivative time", lambda e: _with_filter(e, ratio=_USUAL), is_source=is_source
+        )
+    return ""
+
+
+_FORMS: Final = {Form.SERIES: "interacting (series)", Form.STANDARD: "noninteracting (standard)"}
+
+
+def _with_filter(e: Equation, ratio: float) -> Equation:
+    filt = e.derivative.filter
+    new = Filter.model_validate({"applies-to": "term", "ratio": ratio}) if filt is None else filt.model_copy(update={"ratio": ratio})
+    return e.model_copy(update={"derivative": e.derivative.model_copy(update={"filter": new})})
+
+
+def _short(x: float) -> str:
+    return number(float(f"{x:.4g}"))
+
+
+def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], Equation], *, is_source: bool) -> str:
+    """Return the dials that another fact of the source leads to, or how far off the dials are with another one of the target."""
+    varied = replace(s, variant=replace(s.variant, equation=change(s.equation)))
+    try:
+        if not is_source:
+            work = c.ranking[0].solver
+            if work is None:
+                return ""
+            return f"{when} the two differ by {percent(work.continuous_deviation(varied))} in the loop band"
+        from pidemu.conversion.convert import converted
+
+        options = dict(c.settings.options)
+        request = replace(c.request, options=options, assume=True, allow_approximate=True, digits=c.request.digits or 5, process=None)
+        other = converted(varied, c.settings.card, request, emulate=False)
+    except PidemuError:
+        return ""
+    dials = [f"{n} {_short(v.value)}" for n, v in other.settings.items() if v.active and _short(v.value) != _short(c.settings[n].value)]
+    if dials:
+        return f"{when}: {', '.join(dials)}"
+    return f"{when}: the same dials, {percent(other.certificate.feedback.loop_band.max_deviation)} in the loop band"

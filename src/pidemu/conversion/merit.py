@@ -1,0 +1,260 @@
+"""How good one choice of a target's options is: what is compared, in which order (specs/equations.md, section 9)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass, fields
+from typing import Final
+
+from pidemu.algorithm import Algorithm
+from pidemu.card.base import Form, Status
+from pidemu.card.models import Equation
+from pidemu.card.references import is_active
+from pidemu.certificate.models import RANK, Certificate
+from pidemu.conversion.evidence import filter_status
+from pidemu.conversion.modes import in_mode, law_in, looked_at
+from pidemu.conversion.noise import high_frequency_gain, noise_ratio
+from pidemu.conversion.rounding import rounding_error
+from pidemu.conversion.solve import Solver
+from pidemu.settings import Settings
+from pidemu.units import Role
+
+_NOISY: Final = 1.5
+"""Noise gain per source's from which another option is better."""
+_NEAR: Final = 0.01
+"""Deviation in the loop band that counts as none beside a filter that is only assumed or inferred."""
+_FAR: Final = 0.2
+"""Deviation in the loop band from which a choice is another class: no form is worth that."""
+_DISTANCE: Final = {
+    (Form.STANDARD, Form.SERIES): 2, (Form.STANDARD, Form.PARALLEL): 1, (Form.SERIES, Form.STANDARD): 1,
+    (Form.SERIES, Form.PARALLEL): 2, (Form.PARALLEL, Form.STANDARD): 1, (Form.PARALLEL, Form.SERIES): 2,
+}  # fmt: skip
+"""How far a form is from another, to somebody who knows the dials of the first."""
+_TERMS: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+_DIAL: Final = 1e-6
+"""Relative difference from which a dial is another one."""
+_SURE_ROUNDING: Final = 5e-4
+"""Relative rounding of a dial that nobody notices."""
+
+
+@dataclass(frozen=True, slots=True)
+class Merit:
+    """What is compared of two choices, smaller first; each field only breaks ties of those before it.
+
+    Attributes
+    ----------
+    unused : int
+        Dials that the user gave and that are not in use.
+    setpoint : int
+        How far the terms that see the setpoint are from the source's, in the worst mode: see `setpoint_class`.
+    nonlinear : bool
+        Whether what is not linear, such as a squared error, differs.
+    noisy : bool
+        Whether noise is more than 1.5 times the source's without the law being the same.
+    verdict : int
+        Class of the verdict.
+    form : int
+        How far the form is from the source's.
+    by_number : bool
+        Whether a term that the source does not have is switched off by a number, not by the structure.
+    dials : int
+        Dials that are not the source's own numbers.
+    rules : bool
+        Whether equal laws differ by their scan rules.
+    assumed : int
+        How much of windup, transfer and rules is only assumed.
+    windup : bool
+        Whether the windup scheme is another one.
+    noise : int
+        Distance of the noise gains, in steps of 10 %.
+    derivative : bool
+        Whether a derivative that is off would act on the error.
+    rounding : int
+        Coarse relative rounding of the dials at their resolution.
+    units : int
+        Dials that are not in the source's unit.
+    changed : int
+        Options that are not as the card delivers them.
+    """
+
+    unused: int = 0
+    setpoint: int = 0
+    nonlinear: bool = False
+    noisy: bool = False
+    verdict: int = 0
+    form: int = 0
+    by_number: bool = False
+    dials: int = 0
+    rules: bool = False
+    assumed: int = 0
+    windup: bool = False
+    noise: int = 0
+    derivative: bool = False
+    rounding: int = 0
+    units: int = 0
+    changed: int = 0
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """What to sort by."""
+        return astuple(self)
+
+    def worse_by(self, best: Merit) -> str:
+        """Return in words by what this is worse than the best; empty where it is as good."""
+        return next((_WORDS[f.name] for f in fields(self) if getattr(self, f.name) > getattr(best, f.name)), "")
+
+
+_WORDS: Final = {
+    "unused": "a dial that was given is not in use",
+    "setpoint": "other terms see the setpoint",
+    "nonlinear": "a nonlinear option differs",
+    "noisy": "much more noise on the output",
+    "verdict": "farther from the source",
+    "form": "another form than the source's",
+    "by_number": "a term is switched off by a number only",
+    "dials": "more dials that are not the source's numbers",
+    "rules": "another scan rule",
+    "assumed": "more of it is only assumed",
+    "windup": "another behaviour at limits",
+    "noise": "noise farther from the source's",
+    "derivative": "RATE, once used, would act on the error",
+    "rounding": "the dials round more coarsely",
+    "units": "other units than the source's",
+    "changed": "more options off the delivered values",
+}
+
+
+def merit(work: Solver, settings: Settings, certificate: Certificate, changed: int, unused: int) -> Merit:
+    """Return the merit of one choice of the options.
+
+    Parameters
+    ----------
+    work : Solver
+        What solved it.
+    settings : Settings
+        What it found.
+    certificate : Certificate
+        The linear figures.
+    changed, unused : int
+        How many options are not as delivered, and how many given dials are not in use.
+    """
+    source, a, b = work.source, work.source.algorithm(), settings.algorithm()
+    exact = certificate.feedback.is_exact
+    ratio = _noise(work, settings)
+    modes = looked_at(work.mode, source, settings)
+    return Merit(
+        unused=unused,
+        setpoint=max(setpoint_class(in_mode(a, m), in_mode(b, m)) for m in modes),
+        nonlinear=a.beyond_the_law != b.beyond_the_law,
+        noisy=not exact and ratio > _NOISY,
+        verdict=_class(work, certificate),
+        form=0 if source.equation.form is settings.equation.form else _DISTANCE.get((source.equation.form, settings.equation.form), 3),
+        by_number=not a.ki and settings.equation.integral.on != "none",
+        dials=dials_that_differ(source, settings, work.factor),
+        rules=rules_differ(source, settings),
+        assumed=_assumed(settings),
+        windup=a.windup != b.windup,
+        noise=0 if exact or not math.isfinite(ratio) or not ratio else round(abs(math.log(ratio)) * 10),
+        derivative=not b.kd and settings.equation.derivative.on not in ("pv", "none"),
+        rounding=_coarse(rounding_error(settings)),
+        units=_other_units(source, settings),
+        changed=changed,
+    )
+
+
+def setpoint_class(source: Algorithm, target: Algorithm) -> int:
+    """Return how far the terms that see the setpoint are from the source's, by the continuous law.
+
+    0: the same terms. 1: the derivative no longer sees it. 2: a filtered derivative sees it anew. 3: P sees it anew. 4: P on the
+    error became P on the measurement. 5: an unfiltered derivative sees it anew, which spikes the output.
+    """
+    p = (bool(source.b) and source.kp != 0, bool(target.b) and target.kp != 0)
+    d = (bool(source.c) and source.kd != 0, bool(target.c) and target.kd != 0)
+    if d[1] and not d[0]:
+        unfiltered = not (target.has_term_filter or target.has_signal_filter)
+        found = 5 if unfiltered else 2
+    else:
+        found = 1 if d[0] and not d[1] else 0
+    return max(found, 4 if p[0] and not p[1] else 3 if p[1] and not p[0] else 0)
+
+
+def rules_differ(source: Settings, target: Settings) -> bool:
+    """Whether two controllers compute what they have in common by different scan rules."""
+    a, b = source.algorithm(), target.algorithm()
+    found = bool(a.ki and b.ki) and a.integral_rule is not b.integral_rule
+    filtered = (a.has_term_filter or a.has_signal_filter) and (b.has_term_filter or b.has_signal_filter)
+    return found or (bool(a.kd and b.kd) and filtered and a.derivative_rule is not b.derivative_rule)
+
+
+def dials_that_differ(source: Settings, target: Settings, factor: float) -> int:
+    """Return how many of gain, integral and derivative dial are not the source's own number in another unit."""
+    old, new = ([abs(x) for x in _numbers(s)] for s in (source, target))
+    parallel = target.equation.form is Form.PARALLEL
+    if parallel and source.equation.form is not Form.PARALLEL:
+        old = [old[0], old[0] * old[1], old[0] * old[2]]
+    elif not parallel and source.equation.form is Form.PARALLEL:
+        old = [old[0], *(x / old[0] if old[0] else math.inf for x in old[1:])]
+    scale = [abs(factor)] * 3 if parallel else [abs(factor), 1.0, 1.0]
+    return sum(not math.isclose(x * k, y, rel_tol=_DIAL) for x, y, k in zip(old, new, scale, strict=True))
+
+
+def _numbers(settings: Settings) -> list[float]:
+    """Return gain, integral and derivative dial in canonical units, those of a parallel form in percent."""
+    found = []
+    scale = settings.by_role(Role.MULTIPLIER)
+    parallel = settings.equation.form is Form.PARALLEL
+    for role in _TERMS:
+        value = settings.by_role(role)
+        x = 0.0 if value is None else value.canonical
+        if scale is not None and (parallel or role is Role.GAIN):
+            x *= scale.canonical
+        if parallel and role is not Role.GAIN and settings.equation.signals == "engineering":
+            x *= float(settings.spans.ratio)
+        found.append(x * (settings.pace if role is Role.DERIVATIVE else 1 / settings.pace if role is Role.INTEGRAL else 1.0))
+    return found
+
+
+def _class(work: Solver, c: Certificate) -> int:
+    """Return the verdict's class; nearly exact counts as exact where the source's filter is only assumed or inferred."""
+    if c.verdict != "approximate" or c.feedback.is_exact:
+        same = c.feedback.is_exact and c.setpoint.is_exact and (c.setpoint_in_cascade is None or c.setpoint_in_cascade.is_exact)
+        return RANK["exact" if same else "exact-feedback"]
+    off = c.feedback.loop_band.max_deviation
+    known = not work.source.algorithm().kd or filter_status(work.source) in (Status.DOCUMENTED, Status.MEASURED)
+    if off < _NEAR and not known:
+        return RANK["exact" if c.setpoint.loop_band.max_deviation < _NEAR else "exact-feedback"]
+    return RANK["approximate"] + (off > _FAR)
+
+
+def _noise(work: Solver, settings: Settings) -> float:
+    """Return the noise gain per source's; 1 where they cannot be compared, as the source has no filter."""
+    mode = work.first_mode
+    if work.scans is not None:
+        return noise_ratio(law_in(work.source, mode, work.scans[0]), law_in(settings, mode, work.scans[1]), work.factor)
+    return 1.0 if high_frequency_gain(work.law)[1] else noise_ratio(work.law, law_in(settings, mode), work.factor)
+
+
+def _assumed(settings: Settings) -> int:
+    """Return how many fields of windup, transfer and scan rules are only assumed."""
+    found = {s.key for s in settings.variant.statements() if s.is_assumed and _is_of_the_scan(s.path)}
+    return len(found)
+
+
+def _is_of_the_scan(path: str) -> bool:
+    return path.startswith(("transfer", "integral.windup")) or path.endswith(".rule")
+
+
+def _coarse(error: float) -> int:
+    return 0 if error <= _SURE_ROUNDING else math.ceil(math.log2(error / _SURE_ROUNDING))
+
+
+def _other_units(source: Settings, target: Settings) -> int:
+    old, new = ({v.role: v.unit for v in s.values() if v.active and v.role in _TERMS} for s in (source, target))
+    return sum(role in old and old[role] != unit for role, unit in new.items())
+
+
+def unused(e: Equation, wanted: dict[str, object]) -> int:
+    """Return how many of the dials that the user gave are not in use."""
+    names = {n.casefold(): n for n in e.settings}
+    found = [names.get(n.casefold()) for n in wanted]
+    return sum(n is None or not is_active(e, n, e.settings[n]) for n in found)
