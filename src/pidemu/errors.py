@@ -137,11 +137,14 @@ class ConversionRefusedError(PidemuError):
     nearest : Conversion or None
         The nearest settings inside the target's ranges, with the certificate that states their cost;
         ``None`` where the target has no settings that come near.
+    alternatives : tuple of str
+        What could do instead, such as another block or option.
     """
 
-    def __init__(self, message: str, nearest: Conversion | None = None) -> None:
+    def __init__(self, message: str, nearest: Conversion | None = None, alternatives: Iterable[str] = ()) -> None:
         super().__init__(message)
         self.nearest = nearest
+        self.alternatives = tuple(alternatives)
 
 
 class QuestionError(ConversionRefusedError):

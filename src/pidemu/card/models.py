@@ -153,8 +153,8 @@ class CardFile(Equation):
     algorithm: Text = Field(description="The algorithm within the product.")
     kind: Literal["product", "software", "equation"] = Field(
         default="product",
-        description="`product`: what is not stated of a loop was set at the site, and is asked for where it matters. `software`: what is "
-        "not given runs with its documented default. `equation`: a textbook's, which takes the signals of the other side.",
+        description="`product`: what is not stated of a loop was set at the site, and is asked for where it matters. `software`: "
+        "what is not given runs with its documented default. `equation`: a textbook's, which takes the signals of the other side.",
     )
     about: Text | None = Field(default=None, description="What a reader should know first, in a few sentences.")
     sources: dict[Text, Source] = Field(description="What the card rests on, by a short key.")

@@ -100,11 +100,12 @@ def emulation_line(c: Certificate) -> str:
         return ""
     scans = f"{number(e.scan[0])} s" if e.scan[0] == e.scan[1] else f"{number(e.scan[0])} s and {number(e.scan[1])} s"
     taken = " (taken, as none was given)" if e.taken else ""
+    before = ", before rounding" if c.dials else ""
     if e.is_exact:
-        return f"run against each other every {scans}{taken} without limits: the same output, scan by scan"
+        return f"run against each other every {scans}{taken} without limits{before}: the same output, scan by scan"
     still = "none" if e.is_exact_on_measurement else f"{number(float(f'{e.on_measurement:.2g}'))} %"
     return (
-        f"run against each other every {scans}{taken} without limits: outputs differ by up to "
+        f"run against each other every {scans}{taken} without limits{before}: outputs differ by up to "
         f"{number(float(f'{e.largest:.2g}'))} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
         f"{number(float(f'{e.size:.3g}'))} %), while the setpoint rests: {still}"
     )
@@ -118,13 +119,17 @@ def kick_line(c: Certificate) -> str:
     return f"{what}: {number(kick.source)} on the source, {number(kick.target)} on the target"
 
 
-def rounding_line(c: Certificate) -> str:
-    """Return what rounding the dials did to the deviation in the loop band; nothing where none was rounded."""
+def rounding_line(c: Certificate, digits: int | None) -> str:
+    """Return what rounding the dials did; nothing where none was rounded."""
     before = c.feedback_before_rounding
     if before is None:
         return ""
-    old, new = before.loop_band.max_deviation, c.feedback.loop_band.max_deviation
-    return f"deviation in the loop band before rounding: {percent(old)}, after: {percent(new)}"
+    how = ", ".join(d.name for d in c.dials if d.to_resolution)
+    words = f"rounded to {digits} digits" + (f", {how} to the dial's resolution" if how else "")
+    if before.is_exact:
+        return f"{words}: within {percent(c.headline.loop_band.max_deviation)}"
+    old, new = (percent(p.loop_band.max_deviation) for p in (before, c.headline))
+    return f"{words}: {new} instead of {old} in the loop band"
 
 
 def textbook_line(c: Conversion) -> str:

@@ -95,11 +95,14 @@ class Rounded:
         The dial.
     exact, rounded : float
         Its value before and after [the dial's unit].
+    to_resolution : bool
+        Whether it was the dial's resolution, not a number of digits, that decided.
     """
 
     name: str
     exact: float
     rounded: float
+    to_resolution: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,7 +316,7 @@ class Certificate:
 
     @property
     def is_bent(self) -> bool:
-        """Whether something beyond the law differs that signals within the limits show: a deadband, a rate limit, the arithmetic."""
+        """Whether something beyond the law differs that signals inside the limits show: a deadband, a rate limit, arithmetic."""
         return not {d.aspect for d in self.nonlinear}.isdisjoint(("error", "output", "arithmetic"))
 
     @property
@@ -329,7 +332,7 @@ class Certificate:
 
     def verdict_in(self, mode: Literal["auto", "cascade"]) -> Verdict:
         """Return the verdict in one mode; they differ only where `setpoint_in_cascade` is stated."""
-        emulated = None if self.dials else self.scan_by_scan
+        emulated = self.scan_by_scan
         contradicted = emulated is not None and emulated.same_rules and not emulated.is_exact_on_measurement
         slow = self.scan_cost is not None and self.scan_cost.matters and not self.compensated
         coarse = self.rounding is not None and self.rounding > COARSE

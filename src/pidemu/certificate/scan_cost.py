@@ -1,4 +1,4 @@
-"""What scan intervals and scan rules cost: the phase that a new controller loses against the old one (specs/equations.md, section 9)."""
+"""What scan intervals and rules cost: the phase that a new controller loses against the old one (specs, section 9)."""
 
 from __future__ import annotations
 

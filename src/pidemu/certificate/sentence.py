@@ -52,8 +52,8 @@ def _of_the_controllers(c: Certificate, conditions: Sequence[str]) -> str:
         return f"The two equations are the same{_if(conditions)}; what differs is when they are computed.{other}"
     if law and c.is_bent:
         return (
-            f"The two equations are the same{_if(conditions)}, but one controller does something to its signals that the other does not: "
-            "see what to watch for."
+            f"The two equations are the same{_if(conditions)}, but one controller does something to its signals that the other does"
+            " not: see what to watch for."
         )
     if law:
         return f"The two equations are the same{_if(conditions)}, but the dials round so coarsely that {_differ(c)}."
@@ -66,7 +66,8 @@ def _lies(c: Certificate) -> str:
 
 def _differ(c: Certificate) -> str:
     band = c.headline.loop_band
-    return f"the controller's gain differs by up to {_number(band.gain_db)} dB and its phase by up to {_number(band.phase_deg)} degrees"
+    gain, phase = _number(band.gain_db), _number(band.phase_deg)
+    return f"the controller's gain differs by up to {gain} dB and its phase by up to {phase} degrees"
 
 
 def _also(c: Certificate) -> str:
@@ -111,7 +112,7 @@ def _of_the_scans(c: Certificate) -> Iterator[str]:
     if cost is None:
         return
     if cost.too_slow:
-        yield f"{_SLOW[cost.too_slow]} for this loop: half the scan rate lies below the crossover. Scan faster, or tune again, slower."
+        yield f"{_SLOW[cost.too_slow]} for this loop: half its rate lies below the crossover. Scan faster, or tune again, slower."
     elif abs(cost.phase_deg) >= _LEAST:
         yield _phase(c, cost)
 

@@ -1,4 +1,4 @@
-"""How ``pidemu convert`` prints a conversion: settings, verdict, figures, what to watch for."""
+"""How ``pidemu convert`` prints a conversion: settings, verdict and conditions first, what to do at the loop, figures below."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pidemu.certificate.figures import (
 )
 from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
-from pidemu.conversion.choices import Attempt
+from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
@@ -33,13 +33,25 @@ if TYPE_CHECKING:
 
 
 def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, as_json: bool) -> None:
-    """Print why a target refuses, and the nearest settings with their cost."""
+    """Print why a target refuses, the nearest settings with their cost, and what could do instead."""
     nearest = error.nearest
     if as_json:
-        plain = nearest.to_dict() if nearest else {"from": {"card": source.card.id}, "to": {"card": goal.id}}
-        print_json({**plain, "verdict": "refused", "reason": str(error)})
+        print_json(
+            {
+                "from": source.to_dict(),
+                "to": {"card": goal.id},
+                "verdict": "refused",
+                "reason": str(error),
+                "nearest": None if nearest is None else nearest.to_dict(),
+                "alternatives": list(error.alternatives),
+            }
+        )
     click.echo(f"error: refused: {error}", err=True)
-    if nearest is None or as_json:
+    if as_json:
+        return
+    for text in error.alternatives:
+        click.echo(f"instead: {text}", err=True)
+    if nearest is None:
         return
     band = nearest.certificate.feedback.loop_band
     click.echo("nearest settings, which 'pidemu convert --allow-approximate' gives:", err=True)
@@ -49,29 +61,33 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     click.echo(f"their cost: up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band", err=True)
 
 
-def print_conversion(c: Conversion, round_dials: bool) -> None:
+def print_conversion(c: Conversion) -> None:
     """Print a conversion with its certificate."""
-    heading(f"{c.source.card.id}  ->  {c.settings.card.id}")
+    heading(f"{c.request.tag + ': ' if c.request.tag else ''}{c.source.card.id}  ->  {c.settings.card.id}")
     _side("From", c.source)
     _target(c)
     heading("\nVerdict")
     wrapped(f"{c.verdict}: {c.sentence}", "  ")
+    _list("Other settings", tuple(f"{b.text}" + (f"  ({b.how})" if b.how else "") for b in c.beside))
+    _list("Conditions", tuple(condition_line(x) for x in c.conditions))
+    _list("At the loop", c.at_the_loop)
+    _list("Watch for", c.warnings)
+    _list("Read as", (*c.source.notes, *c.settings.notes))
+    heading("\nFigures")
     _figures(c.certificate)
-    _rounding(c, round_dials)
     _textbook(c)
     if c.certificate.loop is not None:
         _loop(c.certificate.loop)
-    _list("Watch for", c.warnings)
-    _list("Read as", (*c.source.notes, *c.settings.notes))
-    _list("These settings rest on what is inferred, not stated", c.inferences)
-    _list("These settings rest on what nobody says", c.law_assumptions)
-    others = len(c.assumptions) - len(c.law_assumptions)
-    if others:
-        wrapped(
-            f"{others} more assumption{'s concern' if others > 1 else ' concerns'} scan rules, limits and transfers: 'pidemu show' "
-            "and --json list them.",
-            "  ",
-        )
+
+
+def condition_line(condition: object) -> str:
+    """Return a condition with its reason and its spread, in one line."""
+    from pidemu.conversion.conditions import Condition
+
+    assert isinstance(condition, Condition)
+    why = f": {condition.why}" if condition.why else ""
+    spread = f"; {condition.spread}" if condition.spread else ""
+    return f"{condition.text} ({condition.status}{why}){spread}"
 
 
 def print_plan(plan: TransferPlan) -> None:
@@ -88,19 +104,11 @@ def _bump(x: float) -> str:
     return number(round(x, 9) + 0.0)
 
 
-def print_ranking(c: Conversion) -> None:
-    """Print every choice of the target's options, the best first."""
-    heading("\nChoices of the options, the best first")
-    table(["options", "verdict", "loop band", "setpoint path"], [_ranked(a) for a in c.ranking], right=(2, 3))
-
-
-def _ranked(a: Attempt) -> list[str]:
-    changes = ", ".join(f"{n}={x}" for n, x in a.changed.items()) or "as the card delivers them"
-    if a.certificate is None:
-        return [changes, "refused", "-", "-"]
-    setpoint = a.certificate.setpoint_at_scan or a.certificate.setpoint
-    verdict = f"{a.verdict}, scan rules differ" if a.rules_differ else a.verdict
-    return [changes, verdict, *(percent(p.loop_band.max_deviation) for p in (a.certificate.headline, setpoint))]
+def print_explanation(c: Conversion) -> None:
+    """Print every choice of the target's options, the best first, with what it would cost."""
+    heading("\nWhy these options")
+    rows = [[e.options, e.verdict, e.loop_band, e.setpoint, e.dials, e.why] for e in explained(c)]
+    table(["options", "verdict", "loop band", "setpoint", "dials", "why not"], rows, right=(2, 3))
 
 
 def _loop(loop: LoopComparison) -> None:
@@ -116,19 +124,24 @@ def _side(title: str, s: Settings) -> None:
         if v.active
     ]
     table(["", "", "", "", ""], rows, right=(1,))
+    if s.pace != 1:
+        click.echo(f"  executed at {number(s.pace)} times the interval it computes with: its times are that much longer")
 
 
 def _target(c: Conversion) -> None:
     s, book = c.settings, c.textbook.settings
     heading(f"\nTo: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
     if c.chosen:
-        wrapped(f"chosen, as nobody said otherwise: {', '.join(f'{n}={x}' for n, x in c.chosen.items())}; --set decides", "  ")
+        wrapped(
+            f"chosen automatically: {', '.join(f'{n}={x}' for n, x in c.chosen.items())} (--set to change, --explain for why)", "  "
+        )
     rows = []
     for name, v in s.items():
         if v.active:
             rule = number(book[name].value) if book is not None and name in book else "-"
             rows.append([name, number(v.value), unit_of(v), other_units(v), rule])
     table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
+    wrapped(rounding_line(c.certificate, c.request.digits), "  ")
 
 
 def _figures(c: Certificate) -> None:
@@ -136,19 +149,6 @@ def _figures(c: Certificate) -> None:
     if c.scan_by_scan is not None:
         wrapped(emulation_line(c), "  ")
     click.echo(f"  {kick_line(c)}")
-
-
-def _rounding(conversion: Conversion, asked: bool) -> None:
-    c = conversion.certificate
-    unknown = [n for n, v in conversion.settings.items() if v.active and v.setting.resolution is None]
-    if asked and unknown:
-        click.echo(f"  not rounded, since the card states no resolution: {', '.join(unknown)}")
-    if not c.dials:
-        return
-    heading("\nRounded to the dials' resolution")
-    table(["", "exact", "rounded"], [[d.name, number(d.exact), number(d.rounded)] for d in c.dials], right=(1, 2))
-    if c.feedback_before_rounding is not None:
-        click.echo(f"  {rounding_line(c)}")
 
 
 def _textbook(c: Conversion) -> None:

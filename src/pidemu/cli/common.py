@@ -79,22 +79,22 @@ class Step(_StepType):
             self.fail(str(error), param, ctx)
 
 
-class Scan(_PairType):
+class Scan(_StepType):
     """One scan interval, or two with a comma between [s]."""
 
     name = "H[,H2]"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | tuple[float, float]:
         """Read one or two intervals."""
-        if isinstance(value, tuple):
+        if isinstance(value, float | tuple):
             return value
         try:
             intervals = [float(x) for x in str(value).removesuffix("s").split(",")]
             if not 1 <= len(intervals) <= 2 or not all(math.isfinite(x) and x > 0 for x in intervals):
                 raise ValueError
         except ValueError:
-            self.fail(f"'{value}' is no scan interval; write seconds, such as 0.5, or 1,0.5 for source and target", param, ctx)
-        return intervals[0], intervals[-1]
+            self.fail(f"'{value}' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for source and target", param, ctx)
+        return intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
 
 
 action_option = click.option(

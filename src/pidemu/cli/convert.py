@@ -9,11 +9,13 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.cli.certificate import print_conversion, print_plan, print_ranking, print_refusal
+from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
 from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.conversion.request import DIGITS
+from pidemu.errors import ConversionRefusedError, QuestionError, SettingError
 from pidemu.settings import Settings
 
 
@@ -46,21 +48,46 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option(
     "--scan",
     type=Scan(),
-    help="Scan interval of both, or of source and target [s]: the settings make up for intervals and rules that differ. "
-    "(The gain is not multiplied by the ratio of the intervals: settings are per second, not per scan.)",
+    help="Scan interval that both, or source and target, compute with [s]. (Do not multiply the gain by their ratio: settings "
+    "are per second, not per scan.)",
 )
-@click.option("--no-compensation", "plain", is_flag=True, help="With --scan: the settings of the continuous law all the same.")
+@click.option(
+    "--runs-every",
+    type=Scan(),
+    help="Interval at which the source, or source and target, are really executed, where it is not the one computed with [s].",
+)
+@click.option("--compensate", is_flag=True, help="With --scan: make up for scan intervals and rules that differ.")
+@click.option(
+    "--mode",
+    type=click.Choice(["auto", "cascade", "both"]),
+    default="both",
+    show_default=True,
+    help="Which setpoint counts: the operator's, a remote one, or both.",
+)
+@click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    help="Control action; reverse: the output falls when PV rises. The dials do not depend on it, the cut-over does.",
+)
 @click.option(
     "--match",
     metavar="MATCH",
     callback=_match,
-    help="exact, low-frequency, textbook, frequency:0.02rad/s, constrained; with --process also frequency (at the crossover) "
-    "and loop. By default exact where possible, else low-frequency.",
+    help="exact, same-numbers (the source's own), low-frequency, textbook, frequency:0.02rad/s, constrained; with --process also "
+    "frequency (at the crossover) and loop. By default the first that is near enough.",
 )
 @click.option("--process", metavar="gain=...,lag=...,delay=...", help="The process, for the loop before and after (times in s).")
-@click.option("--all-options", is_flag=True, help="Rank every choice of the target's options.")
+@click.option("--explain", is_flag=True, help="Say why these options were chosen, and what every other choice would cost.")
+@click.option("--assume", is_flag=True, help="Take the cards' defaults for everything that would be asked, and say so.")
 @click.option("--allow-approximate", is_flag=True, help="Where the target refuses, give the nearest settings.")
-@click.option("--round", "round_dials", is_flag=True, help="Round to the target's resolution and state the effect.")
+@click.option(
+    "--digits",
+    type=click.IntRange(1, 17),
+    default=DIGITS,
+    show_default=True,
+    help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
+)
+@click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
 @click.option("--pv-range", type=Pair(), help="Measurement range of the source [engineering units].")
 @click.option("--op-range", type=Pair(), help="Output range of the source [engineering units].")
 @click.option("--to-pv-range", type=Pair(), help="Measurement range of the target; by default the source's.")
@@ -78,13 +105,18 @@ def command(
     fixed: tuple[str, ...],
     word: str | None,
     loop_file: str | None,
-    scan: tuple[float, float] | None,
-    plain: bool,
+    scan: float | tuple[float, float] | None,
+    runs_every: float | tuple[float, float] | None,
+    compensate: bool,
+    mode: str,
+    action: str | None,
     match: str | None,
     process: str | None,
-    all_options: bool,
+    explain: bool,
+    assume: bool,
     allow_approximate: bool,
-    round_dials: bool,
+    digits: int,
+    tag: str,
     pv_range: tuple[float, float] | None,
     op_range: tuple[float, float] | None,
     to_pv_range: tuple[float, float] | None,
@@ -97,7 +129,8 @@ def command(
     """Convert the settings NAME=VALUE of CARD to another card.
 
     Values are numbers in the card's unit, or have one: "RESET=20 s/repeat". Prints the target's settings, how near the two
-    controllers are, and what will behave differently. Exit status 1 if the target refuses.
+    controllers are, and what will behave differently. Exit status 1 if something has to be answered first, or if the target
+    refuses.
     """
     if word is not None and card is not None:
         values, card = (card, *values), None  # what stands first is a value then
@@ -121,8 +154,9 @@ def command(
     goal = load_card(target, vendors)
     options, dials = split_options(goal, wanted)
     arguments: dict[str, Any] = {
-        "options": options, "given": dials, "scan": scan, "compensate": not plain, "match": match, "round_dials": round_dials,
-        "pv_range": to_pv_range, "op_range": to_op_range, "allow_approximate": allow_approximate, "all_options": all_options,
+        "options": options, "given": dials, "scan": scan, "runs_every": runs_every, "compensate": compensate, "mode": mode,
+        "action": action, "match": match, "digits": digits, "to_pv_range": to_pv_range, "to_op_range": to_op_range,
+        "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
     }  # fmt: skip
     if process is not None:
         from pidemu.loop.process import parse_process
@@ -134,6 +168,9 @@ def command(
         source = load_card(card or "", vendors).settings({**given, **ranges})
     try:
         conversion = convert(source, goal, **arguments)
+    except QuestionError as error:
+        print_questions(error, source, goal.id, as_json)
+        raise SystemExit(1) from None
     except ConversionRefusedError as error:
         print_refusal(error, source, goal, as_json)
         raise SystemExit(1) from None
@@ -145,11 +182,11 @@ def command(
     if as_json:
         print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
         return
-    print_conversion(conversion, round_dials)
+    print_conversion(conversion)
     if plan is not None:
         print_plan(plan)
-    if all_options:
-        print_ranking(conversion)
+    if explain:
+        print_explanation(conversion)
     if page is not None:
         click.echo(f"\nwritten: {page}")
 

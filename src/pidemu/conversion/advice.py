@@ -141,11 +141,11 @@ def _scan(c: Conversion) -> Iterator[str]:
         yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
     if c.scan[0] != c.scan[1]:
         yield (
-            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: the settings are per second, so do not scale the gain by the "
-            "ratio of the intervals"
+            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: the settings are per second, so do not scale the gain by "
+            "the ratio of the intervals"
         )
     if c.request.compensate:
         yield (
-            "the settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules that "
-            "are often only assumed"
+            "the settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules "
+            "that are often only assumed"
         )

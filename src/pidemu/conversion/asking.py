@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from pidemu.card.load import Card
 from pidemu.conversion.command import words_for
@@ -35,8 +36,9 @@ def _worked_out(answer: Answer, source: Settings, card: Card, request: Request) 
 
     try:
         read = replace(source.changed(answer.given), pace=1.0) if answer.given else replace(source, pace=1.0)
-        asked = replace(request, **{**answer.asked, "assume": True, "digits": request.digits or DIGITS})
-        command = words_for(read, card, replace(request, **answer.asked))
+        stated: dict[str, Any] = dict(answer.asked)
+        asked = replace(request, **{**stated, "assume": True, "digits": request.digits or DIGITS})
+        command = words_for(read, card, replace(request, **stated))
     except PidemuError as error:
         return replace(answer, outcome=str(error))
     try:
@@ -57,8 +59,8 @@ def mode_is_open(source: Settings, ranking: tuple[Attempt, ...], request: Reques
 def mode_question(source: Settings) -> Question:
     """Return the question for the mode in which a loop runs."""
     text = (
-        f"{source.card.id}: the equation depends on the mode (in cascade other terms see the setpoint than in automatic), and no choice "
-        "of the target's options does the same in both. In which mode does the loop run?"
+        f"{source.card.id}: the equation depends on the mode (in cascade other terms see the setpoint than in automatic), and no "
+        "choice of the target's options does the same in both. In which mode does the loop run?"
     )
     return Question(
         "mode",

@@ -79,7 +79,9 @@ def _runner_up_text(best: Attempt, other: Attempt) -> str:
     also = "also " if other.verdict == best.verdict else ""
     off = other.certificate.headline.loop_band.max_deviation
     verdict = f"{also}{other.verdict}" if off <= EXACT else f"{percent(off)} in the loop band"
-    options = ", ".join(f"{n}={x}" for n, x in other.settings.options.items() if best.settings and best.settings.options.get(n) != x)
+    options = ", ".join(
+        f"{n}={x}" for n, x in other.settings.options.items() if best.settings and best.settings.options.get(n) != x
+    )
     return f"{options}: {verdict}, {_dials(other.settings)}"
 
 
@@ -164,5 +166,6 @@ def _unstated(c: Conversion) -> Iterator[Beside]:
                 found = converted(replace(other.settings, pace=1.0), c.settings.card, request, emulate=False)
                 if _is_another(c.settings, found.settings):
                     options = "".join(f", {n}={x}" for n, x in found.settings.options.items() if c.settings.options.get(n) != x)
-                    text = f"{o.about} is not stated and {o.taken.value} is taken; with {other.value}: {_dials(found.settings)}{options}"
+                    stated = f"{o.about} is not stated and {o.taken.value} is taken"
+                    text = f"{stated}; with {other.value}: {_dials(found.settings)}{options}"
                     yield Beside("unstated", text, found.settings, f"{o.about}={other.value}")

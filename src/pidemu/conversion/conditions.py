@@ -1,4 +1,4 @@
-"""On which unverified facts a result rests, and how far it could be off: the conditions of a verdict (specs/equations.md, section 9)."""
+"""On which unverified facts a result rests, and how far off it could be: the conditions of a verdict (specs, section 9)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,8 @@ def conditions_of(c: Conversion) -> tuple[Condition, ...]:
 def _of(c: Conversion, s: Settings, *, is_source: bool) -> Iterator[Condition]:
     if s.card.data.kind == "equation":
         return
-    a, found = s.algorithm(), {}
+    a = s.algorithm()
+    found: dict[str, tuple[int, Statement, str]] = {}
     for statement in s.variant.statements():
         evidence = statement.evidence
         if evidence is None or evidence.status not in (Status.ASSUMED, Status.INFERRED) or statement.path not in _MATTER:
@@ -157,7 +158,11 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
         return "; ".join(t for t in texts if t)
     if statement.path == "derivative.on" and s.equation.derivative.filter is None and statement.is_assumed:
         return _result(
-            c, s, f"with a filter of {_USUAL:g} of the derivative time", lambda e: _with_filter(e, ratio=_USUAL), is_source=is_source
+            c,
+            s,
+            f"with a filter of {_USUAL:g} of the derivative time",
+            lambda e: _with_filter(e, ratio=_USUAL),
+            is_source=is_source,
         )
     return ""
 
@@ -167,7 +172,9 @@ _FORMS: Final = {Form.SERIES: "interacting (series)", Form.STANDARD: "noninterac
 
 def _with_filter(e: Equation, ratio: float) -> Equation:
     filt = e.derivative.filter
-    new = Filter.model_validate({"applies-to": "term", "ratio": ratio}) if filt is None else filt.model_copy(update={"ratio": ratio})
+    new = (
+        Filter.model_validate({"applies-to": "term", "ratio": ratio}) if filt is None else filt.model_copy(update={"ratio": ratio})
+    )
     return e.model_copy(update={"derivative": e.derivative.model_copy(update={"filter": new})})
 
 
@@ -187,11 +194,15 @@ def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], 
         from pidemu.conversion.convert import converted
 
         options = dict(c.settings.options)
-        request = replace(c.request, options=options, assume=True, allow_approximate=True, digits=c.request.digits or 5, process=None)
+        request = replace(
+            c.request, options=options, assume=True, allow_approximate=True, digits=c.request.digits or 5, process=None
+        )
         other = converted(varied, c.settings.card, request, emulate=False)
     except PidemuError:
         return ""
-    dials = [f"{n} {_short(v.value)}" for n, v in other.settings.items() if v.active and _short(v.value) != _short(c.settings[n].value)]
+    dials = [
+        f"{n} {_short(v.value)}" for n, v in other.settings.items() if v.active and _short(v.value) != _short(c.settings[n].value)
+    ]
     if dials:
         return f"{when}: {', '.join(dials)}"
     return f"{when}: the same dials, {percent(other.certificate.feedback.loop_band.max_deviation)} in the loop band"

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
+from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
 from pidemu.conversion.asking import ask, mode_is_open, mode_question
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
 from pidemu.conversion.questions import Question
@@ -79,13 +81,13 @@ def convert(
     action : {"reverse", "direct"}, optional
         The control action, reverse: the output falls when the measurement rises. The dials do not depend on it.
     to_pv_range, to_op_range : tuple, optional
-        Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity rescales
-        the gains, the same signal on another scale does not.
+        Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity
+        rescales the gains, the same signal on another scale does not.
     match : str, optional
         How to match: ``"exact"``, ``"same-numbers"`` (the source's own), ``"low-frequency"``, ``"textbook"``,
-        ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load response
-        changes least), ``"constrained"`` (the largest deviation in the loop band is least); by default the first of these that is
-        near enough.
+        ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load
+        response changes least), ``"constrained"`` (the largest deviation in the loop band is least); by default the first of these
+        that is near enough.
     process : Process, optional
         The process, for the figures of the closed loop before and after, and to place the loop band.
     compensate : bool
@@ -175,10 +177,11 @@ def _concluded(
     """Return the conversion with its certificate, about the dials as they are printed."""
     work = best.solver
     assert work is not None  # there are settings
-    unrounded, dials = settings, ()
+    unrounded = settings
+    dials: tuple[Rounded, ...] = ()
     if request.digits is not None:
         settings, dials = rounded(settings, request.digits, request.given)
-    certificate = full_certificate(work, settings, unrounded, emulate=emulate)
+    certificate = full_certificate(work, settings, unrounded if dials else settings, emulate=emulate)
     if dials:
         certificate = replace(certificate, dials=dials)
     return Conversion(
@@ -213,14 +216,19 @@ class _Work:
         if request.scan is not None:
             source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
-    def ranking(self, mode: str | None = None, taken: Mapping[str, object] | None = None) -> tuple[Attempt, ...]:
+    def ranking(self, mode: Mode | None = None, taken: Mapping[str, object] | None = None) -> tuple[Attempt, ...]:
         """Return every choice of the options, the best first."""
         request = self.request if mode is None else replace(self.request, mode=mode)
 
         def solver(named: Mapping[str, object]) -> Solver:
             source = self.source
             goal = Target(
-                self.card, named, self.fixed, request.pv_range or source.pv_range, request.op_range or source.op_range, request.pace[1]
+                self.card,
+                named,
+                self.fixed,
+                request.pv_range or source.pv_range,
+                request.op_range or source.op_range,
+                request.pace[1],
             )
             goal.reject_missing()
             sign = -1 if _is_negative(source, goal) else 1
@@ -232,7 +240,7 @@ class _Work:
 
     def mode_question(self) -> list[Question]:
         """Return the question for the mode, where the answers lead to other settings."""
-        best = [self.ranking(mode)[0].settings for mode in ("auto", "cascade")]
+        best = [self.ranking(mode)[0].settings for mode in MODES]
         if best[0] == best[1]:
             return []
         return [mode_question(self.source)]
@@ -261,7 +269,7 @@ def _paced(source: Settings, request: Request) -> Settings:
         return source
     if source.equation.scan.interval == "measured":
         raise ScanError(
-            f"{source.card.id} measures its interval, so it computes with the one at which it runs; leave out runs_every (--runs-every)"
+            f"{source.card.id} measures its interval, so it computes with the one at which it runs; leave out --runs-every"
         )
     return replace(source, pace=pace)
 

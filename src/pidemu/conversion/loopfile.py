@@ -40,15 +40,15 @@ class Loop:
         Source and target card.
     settings, set : dict
         What is given for the source and for the target.
-    scan : tuple of float or None
-        Scan intervals [s].
+    scan : float, tuple of float or None
+        Scan interval of both, or of source and target [s].
     """
 
     card: str
     settings: dict[str, Any]
     to: str | None
     set: dict[str, Any]
-    scan: tuple[float, float] | None
+    scan: float | tuple[float, float] | None
     process: str | None = None
 
 
@@ -73,5 +73,5 @@ def read_loop(file: Path) -> Loop:
     except ValidationError as error:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
     intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
-    scan = (intervals[0], intervals[-1]) if intervals else None
+    scan = None if not intervals else intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
     return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process)

@@ -148,7 +148,9 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         nonlinear=a.beyond_the_law != b.beyond_the_law,
         noisy=not exact and ratio > _NOISY,
         verdict=_class(work, certificate),
-        form=0 if source.equation.form is settings.equation.form else _DISTANCE.get((source.equation.form, settings.equation.form), 3),
+        form=0
+        if source.equation.form is settings.equation.form
+        else _DISTANCE.get((source.equation.form, settings.equation.form), 3),
         by_number=not a.ki and settings.equation.integral.on != "none",
         dials=dials_that_differ(source, settings, work.factor),
         rules=rules_differ(source, settings),

@@ -1,4 +1,4 @@
-"""The modes that a conversion looks at: automatic with the operator's setpoint, and cascade with a remote one (verdicts per mode)."""
+"""The modes that a conversion looks at: automatic with the operator's setpoint, and cascade with a remote one."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pidemu.settings import Settings
 
 Mode = Literal["auto", "cascade"]
 Modes = Literal["auto", "cascade", "both"]
+MODES: Final[tuple[Mode, Mode]] = get_args(Mode)
 CHOICES: Final[tuple[Modes, ...]] = get_args(Modes)
 WORDS: Final[dict[Mode, str]] = {"auto": "in automatic", "cascade": "in cascade"}
 
@@ -31,7 +32,7 @@ def read_mode(mode: object) -> Modes:
 
 
 def in_mode(a: Algorithm, mode: Mode) -> Algorithm:
-    """Return the algorithm as it is in one mode: some change the setpoint weight of P in cascade (specs/equations.md, section 6)."""
+    """Return the algorithm as it is in one mode: some change the setpoint weight of P in cascade (specs, section 6)."""
     return a if mode == "auto" or a.cascade_b is None else replace(a, b=a.cascade_b)
 
 

@@ -75,7 +75,7 @@ def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequen
     problem : Problem
         What is wanted.
     terms : sequence of bool
-        Which of integral, proportional and derivative term are at work. The moment of a term that is not is neither met nor changed:
+        Which of integral, proportional and derivative term are at work. The moment of one that is not is neither met nor changed:
         without a derivative, gain and integral stay the source's but for what the rules do to ``m1``.
 
     Raises

@@ -32,6 +32,8 @@ class Answer:
         Why there is no conversion.
     command : str
         The command that states it.
+    alike : tuple of str
+        Other ways to read it that amount to the same law for measurement.
     """
 
     value: str
@@ -41,6 +43,7 @@ class Answer:
     conversion: Conversion | None = None
     outcome: str = ""
     command: str = ""
+    alike: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain values for JSON."""
@@ -52,6 +55,7 @@ class Answer:
             "options": to.get("options"),
             "outcome": self.outcome,
             "command": self.command,
+            "alike": list(self.alike),
         }
 
 

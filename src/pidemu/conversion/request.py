@@ -162,8 +162,8 @@ def read_request(
 def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float] | None, tuple[float, float]]:
     """Return the intervals at which both are executed [s], and these per the intervals they compute with.
 
-    Of an interval that is stated once only, it is taken that it is both. The target is timed rightly unless its own real interval is
-    given: it computes with its scan interval or, where none is given, with the one at which the source runs.
+    An interval that is stated once only is taken for both. The target is timed rightly unless its own real
+    interval is given: it computes with its scan interval or, where none is given, with the one at which the source runs.
     """
     declared, real = (_one_or_two(x, name) for x, name in ((scan, "scan"), (runs_every, "runs_every")))
     if real is None:

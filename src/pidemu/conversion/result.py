@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
@@ -14,7 +14,7 @@ from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
-from pidemu.conversion.modes import Mode
+from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
@@ -24,8 +24,6 @@ from pidemu.settings import Settings
 if TYPE_CHECKING:
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
-
-MODES: Final[tuple[Mode, Mode]] = ("auto", "cascade")
 
 
 @dataclass(frozen=True)
@@ -135,6 +133,11 @@ class Conversion:
     def sentence(self) -> str:
         """The verdict in a sentence or two for whoever stands at the loop, with the conditions that it rests on."""
         return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed)
+
+    @cached_property
+    def at_the_loop(self) -> tuple[str, ...]:
+        """What to do at the loop: the action, and a check on the bench before the cut-over."""
+        return ()
 
     @cached_property
     def command(self) -> str:

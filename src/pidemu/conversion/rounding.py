@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Final
 
 from pidemu.certificate.models import Rounded
 from pidemu.errors import SettingError
 from pidemu.settings import Settings, Value, limits, off_values
 from pidemu.units import Role, is_reciprocal, parse_unit
+
+_NOTHING: Final = 1e-12
+"""Relative change that is only that of floating point."""
 
 
 def checked_digits(digits: object) -> int | None:
@@ -34,7 +38,11 @@ def rounded(settings: Settings, digits: int, kept: Collection[str] = ()) -> tupl
     """
     names = {name.casefold() for name in kept}
     values = {name: value if name.casefold() in names else _round(value, digits) for name, value in settings.items()}
-    dials = tuple(Rounded(n, settings[n].value, v.value) for n, v in values.items() if v.value != settings[n].value)
+    dials = tuple(
+        Rounded(n, settings[n].value, v.value, v.setting.resolution is not None)
+        for n, v in values.items()
+        if not math.isclose(v.value, settings[n].value, rel_tol=_NOTHING)
+    )
     return replace(settings, values_by_name=values), dials
 
 

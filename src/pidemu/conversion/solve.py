@@ -139,7 +139,7 @@ class Solver:
             return self._compensated(own, "same-numbers", None)
         self.target.filter = self.forms.original_filter
         try:
-            settings, how = self.forms.low_frequency(), "low-frequency"
+            settings = self.forms.low_frequency()
         except (NoMatchError, SettingError) as error:
             raise (why if isinstance(why, NoMatchError) and why.fundamental else error) from None
         if self.forms.certify(settings).feedback.is_exact:

@@ -10,7 +10,7 @@ from pidemu.certificate.linear import bands, deviation
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.questions import Answer, Kind, Question
 from pidemu.errors import PidemuError
-from pidemu.law import Law
+from pidemu.law import Law, PathName
 from pidemu.settings import Settings, off_values
 from pidemu.units import Dimension, Role, parse_quantity, parse_unit
 
@@ -138,7 +138,9 @@ def _inputs(source: Settings) -> Iterator[Open]:
         except PidemuError:
             continue
         unit = f" {value.unit}" if value.unit != "1" else ""
-        taken = Alternative(f"{value.value:g}{unit}", source.changed({name: value.value}), {name: value.value}, "the block's default")
+        taken = Alternative(
+            f"{value.value:g}{unit}", source.changed({name: value.value}), {name: value.value}, "the block's default"
+        )
         other = Alternative("off", without, {name: number}, "no such action was meant")
         text = (
             f"{source.card.id}: {name} is not given, and an open {name} is not off on this block: it is {value.value:g}{unit}. "
@@ -177,5 +179,5 @@ def _drops_a_term(source: Settings, read: Settings) -> bool:
 def _apart(base: Law, law: Law, *, setpoint: bool = False) -> float:
     """Return how far two readings are apart in the loop band of the first, whichever of them counts as the truth."""
     band = bands(base, None)[0]
-    path = "setpoint" if setpoint else "feedback"
+    path: PathName = "setpoint" if setpoint else "feedback"
     return max(deviation(base, law, band, 1.0, path), deviation(law, base, band, 1.0, path))

@@ -1,0 +1,51 @@
+"""Why these options were chosen: every choice with what it would cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pidemu.certificate.figures import number, percent
+
+if TYPE_CHECKING:
+    from pidemu.conversion.options import Attempt
+    from pidemu.conversion.result import Conversion
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """One choice of the options in words.
+
+    Attributes
+    ----------
+    options, verdict, dials : str
+        The options, the verdict, the dials in use.
+    loop_band, setpoint : str
+        Largest deviation in the loop band of feedback and setpoint path.
+    why : str
+        By what it is worse than the best, or why it is refused; of the best that it is taken.
+    """
+
+    options: str
+    verdict: str
+    loop_band: str
+    setpoint: str
+    dials: str
+    why: str
+
+
+def explained(c: Conversion) -> tuple[Explained, ...]:
+    """Return every choice of the target's options that was looked at, the best first."""
+    return tuple(_explained(a, c.ranking[0]) for a in c.ranking)
+
+
+def _explained(a: Attempt, best: Attempt) -> Explained:
+    if a.settings is None or a.certificate is None or a.merit is None:
+        options = ", ".join(f"{n}={x}" for n, x in a.changed.items()) or "as delivered"
+        return Explained(options, "refused", "-", "-", "", str(a.error))
+    options = ", ".join(f"{n}={x}" for n, x in a.settings.options.items()) or "none"
+    paths = (a.certificate.headline, a.certificate.setpoint_headline)
+    off = [percent(p.loop_band.max_deviation) for p in paths]
+    dials = ", ".join(f"{n} {number(float(f'{v.value:.4g}'))}" for n, v in a.settings.items() if v.active and v.given)
+    why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good; this one stands behind in the card"
+    return Explained(options, a.verdict, off[0], off[1], dials, why)
