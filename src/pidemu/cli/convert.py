@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,8 +13,12 @@ from pidemu.cli.certificate import print_conversion, print_plan, print_ranking, 
 from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.errors import ActionError, ConversionRefusedError, SettingError
 from pidemu.settings import Settings
+
+if TYPE_CHECKING:
+    from pidemu.conversion.result import Conversion
+    from pidemu.cutover.plan import TransferPlan
 
 
 def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> str | None:
@@ -68,6 +72,12 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option(
     "--cut-over", "now", metavar="SP,PV,OP", help="Setpoint, measurement and output now: how to change over without a bump."
 )
+@click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    help="Action of the loop. Reverse: the output falls when the measurement rises (error SP - PV). Needed where a cut-over "
+    "depends on it; where the sign of the gain is the action it is known.",
+)
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
@@ -90,6 +100,7 @@ def command(
     to_pv_range: tuple[float, float] | None,
     to_op_range: tuple[float, float] | None,
     now: str | None,
+    action: str | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -123,6 +134,7 @@ def command(
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "compensate": not plain, "match": match, "round_dials": round_dials,
         "pv_range": to_pv_range, "op_range": to_op_range, "allow_approximate": allow_approximate, "all_options": all_options,
+        "action": action,
     }  # fmt: skip
     if process is not None:
         from pidemu.loop.process import parse_process
@@ -137,21 +149,33 @@ def command(
     except ConversionRefusedError as error:
         print_refusal(error, source, goal, as_json)
         raise SystemExit(1) from None
-    plan = None if now is None else conversion.transfer_plan(*_signals(now))
+    plan, not_known = _plan(conversion, now)
     if page is not None:
         from pidemu.report.certificate import write_page
 
         write_page(page, conversion, plan)
     if as_json:
         print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
-        return
-    print_conversion(conversion, round_dials)
-    if plan is not None:
-        print_plan(plan)
-    if all_options:
-        print_ranking(conversion)
-    if page is not None:
-        click.echo(f"\nwritten: {page}")
+    else:
+        print_conversion(conversion, round_dials)
+        if plan is not None:
+            print_plan(plan)
+        if all_options:
+            print_ranking(conversion)
+        if page is not None:
+            click.echo(f"\nwritten: {page}")
+    if not_known is not None:
+        raise not_known
+
+
+def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:
+    """Return how to change over, or why that is not known; the conversion itself does not depend on the action."""
+    if now is None:
+        return None, None
+    try:
+        return conversion.transfer_plan(*_signals(now)), None
+    except ActionError as error:
+        return None, error
 
 
 def _only_reading(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from pidemu.settings import Settings
+from pidemu.action import action_line
 from pidemu.units import Role
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     yield from (difference.text for difference in c.certificate.nonlinear)
     if c.certificate.not_emulated:
         yield f"the two were not run against each other: {c.certificate.not_emulated}"
-    yield from _action(c.source, c.settings)
+    yield from _action(c)
     yield from _scan(c)
 
 
@@ -42,17 +42,6 @@ def _ranges(c: Conversion) -> Iterator[str]:
         yield (
             f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
             "engineering units"
-        )
-    direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
-    if c.factor < 0 and c.source.equation.action.fixed:
-        yield (
-            f"with these settings {c.source.card.id} is direct acting, by the sign of its gain: set the action to '{direct}' on "
-            f"{c.settings.card.id}"
-        )
-    elif c.factor < 0:
-        yield (
-            f"the source's gains are negative: these are positive, so set the action to '{direct}' where the source was reverse "
-            f"acting, to '{reverse}' where it was direct acting"
         )
     for s in (c.source, c.settings):
         if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
@@ -120,18 +109,14 @@ def _noise(c: Conversion) -> Iterator[str]:
         yield f"measurement noise: at {high:.3g} rad/s the target's gain is only {ratio:.3g} times the source's"
 
 
-def _action(source: Settings, target: Settings) -> Iterator[str]:
-    if target.equation.action.fixed and not source.equation.action.fixed:
-        yield (
-            f"action: {target.card.id} has no choice of it, the sign of the gains decides; these are for a loop that was reverse "
-            f"acting, '{source.equation.action.names['reverse']}' on {source.card.id}: where it was direct acting, turn their sign"
-        )
-    old, new = source.equation.action.names, target.equation.action.names
-    if {k: v.casefold() for k, v in old.items()} != {k: v.casefold() for k, v in new.items()}:
-        yield (
-            f"action: reverse acting (output falls when the measurement rises) is '{old['reverse']}' on {source.card.id} and "
-            f"'{new['reverse']}' on {target.card.id}"
-        )
+def _action(c: Conversion) -> Iterator[str]:
+    """Yield what the action is set to, where it is not the same word on both."""
+    old, new = c.source.equation.action, c.settings.equation.action
+    same = {k: v.casefold() for k, v in old.names.items()} == {k: v.casefold() for k, v in new.names.items()}
+    turned = c.factor < 0 and not (old.fixed and new.fixed)
+    if same and not turned and old.fixed == new.fixed:
+        return
+    yield f"action: {c.action_text}; on {c.source.card.id}: {action_line(c.source, c.action)}"
 
 
 def _scan(c: Conversion) -> Iterator[str]:

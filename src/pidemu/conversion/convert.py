@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pidemu.action import check_action, read_action, switch_position
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
@@ -22,6 +23,7 @@ from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.scan.build import Action
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
@@ -48,6 +50,7 @@ def convert(
     compensate: bool = True,
     all_options: bool = False,
     emulate: bool = True,
+    action: str | None = None,
 ) -> Conversion:
     """Convert settings to another card.
 
@@ -83,6 +86,9 @@ def convert(
         Try every choice of the options, also where the card's defaults are exact: see `Conversion.ranking`.
     emulate : bool
         Whether the certificate emulates both controllers; without it the linear figures alone are stated, sooner.
+    action : {"reverse", "direct"}, optional
+        Action of the loop in the ISA sense: reverse acting, the output falls when the measurement rises (error SP - PV). Where the
+        sign of the target's gain is the action, the gain gets that sign. Where that of the source's is, it is known without.
 
     Returns
     -------
@@ -94,7 +100,8 @@ def convert(
     ConversionRefusedError
         The target cannot do what the source does; the error holds the nearest settings and what they would cost.
     SettingError, CardError
-        The target, the match, an option or a given dial is unknown, or a range of the source is missing.
+        The target, the match, an option or a given dial is unknown, a range of the source is missing, or the action contradicts
+        the sign of the source's gain.
     ScanError
         A scan interval is no positive number, or a filter is unstable at it.
 
@@ -112,6 +119,9 @@ def convert(
     _refuse_absurd_gains(source)
     request = read_request(card, options, given, scan, match, pv_range, op_range)
     request = replace(request, process=process, compensate=compensate, allow_approximate=allow_approximate, round_dials=round_dials)
+    request = replace(request, action=read_action(action))
+    if contradiction := check_action(source, request.action):
+        raise SettingError(contradiction)
     factor = _rescaling(source, request)
     taken = {**(source.options if source.card.id == card.id else {}), **request.options}
     fixed = {**_shared(source, card), **request.given}
@@ -121,7 +131,7 @@ def convert(
     def solver(named: Mapping[str, object]) -> Solver:
         goal = Target(card, named, fixed, request.pv_range or source.pv_range, request.op_range or source.op_range)
         goal.reject_missing()
-        sign = -1 if _is_negative(source, goal) else 1
+        sign = -1 if _is_negative(source, goal) or _becomes_negative(source, card, request.action) else 1
         return Solver(source, goal, sign * factor, request.scan, process, compensate=compensate)
 
     ranking = attempts(card, taken, solver, aim, wanted=request.given, every=all_options)
@@ -213,6 +223,12 @@ def _is_negative(source: Settings, target: Target) -> bool:
     """Whether the source has negative gains only, and the target no place for them: then the action changes instead."""
     a, gain = source.algorithm(), target.dial(Role.GAIN)
     return max(a.kp, a.ki, a.kd) <= 0 > min(a.kp, a.ki, a.kd) and gain is not None and limits(gain[1])[0] >= 0
+
+
+def _becomes_negative(source: Settings, target: Card, action: Action | None) -> bool:
+    """Whether the source's switch stands at direct, and the target has none, so that its gain carries the sign."""
+    switched = not source.equation.action.fixed and target.data.action.fixed
+    return switched and action is not None and switch_position(source, action) == "direct"
 
 
 def _shared(source: Settings, target: Card) -> dict[str, object]:

@@ -13,6 +13,7 @@ from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
 from pidemu.reading import signal_range
+from pidemu.scan.build import Action
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
@@ -36,6 +37,8 @@ class Request:
         The process.
     compensate, allow_approximate, round_dials : bool
         As in `convert`.
+    action : {"reverse", "direct"} or None
+        Action of the loop, where it was stated.
     """
 
     options: Mapping[str, object] = field(default_factory=dict)
@@ -48,6 +51,7 @@ class Request:
     compensate: bool = True
     allow_approximate: bool = False
     round_dials: bool = False
+    action: Action | None = None
 
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
@@ -60,6 +64,8 @@ class Request:
                 yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
         if self.match is not None:
             yield from ("--match", self.match)
+        if self.action is not None:
+            yield from ("--action", self.action)
         if self.process is not None:
             yield from ("--process", written(self.process))
         flags = {
