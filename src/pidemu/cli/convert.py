@@ -165,7 +165,8 @@ def command(
         if page is not None:
             click.echo(f"\nwritten: {page}")
     if not_known is not None:
-        raise not_known
+        click.echo(f"error: {not_known}", err=True)
+        raise SystemExit(1)
 
 
 def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:

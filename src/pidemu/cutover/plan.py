@@ -128,12 +128,19 @@ def transfer_plan(
     either, direct = (
         _plan(replace(bench_for(target, (sp, pv, op), scan, a, output_limits), action_known=False)) for a in ACTIONS
     )
-    if either != direct:
+    if not _same(either, direct):
         raise ActionError(
             f"{target.card.id}: what to set at this cut-over depends on the action of the loop, which was not stated; add --action "
             f"reverse or --action direct (action= from Python): {action_line(target)}"
         )
     return either
+
+
+def _same(one: TransferPlan, other: TransferPlan) -> bool:
+    """Tell whether two plans say the same, but for rounding."""
+    near = max(one.resolution, other.resolution)
+    moves = ((one.bump, other.bump), (one.without_plan, other.without_plan))
+    return (one.steps, one.notes) == (other.steps, other.notes) and all(abs(x - y) <= near for x, y in moves)
 
 
 def _plan(bench: Bench) -> TransferPlan:
