@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pidemu.action import carried_action, switch_position
 from pidemu.canonical import default_scan
 from pidemu.card.base import Rule
 from pidemu.certificate.figures import number
+from pidemu.record.files import Floats
 from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for
 from pidemu.scan.build import Action
@@ -31,6 +31,8 @@ _MIDDLE: Final = 50.0
 _WIDE: Final = (-1e9, 1e9)
 _DEAD: Final = 1e-7
 """What is left of filters and derivative when they have died out."""
+_INTEGRATOR: Final = 1e-8
+"""How near to 1 a pole is the integrator's own, which stays."""
 _LONGEST: Final = 2**16
 """Scans after which nothing more is waited for."""
 _SHARE: Final = {Rule.BACKWARD: 1.0, Rule.TRAPEZOIDAL: 0.5, Rule.FORWARD: 0.0}
@@ -99,7 +101,7 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
     Examples
     --------
     >>> import pidemu
-    >>> s = pidemu.load_card("allen-bradley/pide").settings(PGain=1.8, IGain=1.25)
+    >>> s = pidemu.load_card("allen-bradley/pide").settings(PGain=1.8, IGain=1.25, DependIndepend="true")
     >>> bench_check(s, 0.5, "reverse").text
     'In automatic, with PV at SP and the output half way, move PV up by 10 %: the output falls by 18 % and goes on falling at 14.4 % \
 per minute.'
@@ -124,33 +126,31 @@ def _moved(settings: Settings, h: float, action: Action, step: float) -> _Move:
     low, after = (float(x) for x in scale.signals_own(np.array([_MIDDLE, _MIDDLE + step])))
     controller.rest(low, low, scale.output_own(_MIDDLE))
     watched = min(max(math.ceil(60 / h), 20), _LONGEST)
-    u = scale.output_percent(controller.run(np.full(wait + watched, low), np.full(wait + watched, after))) - _MIDDLE
+    still = controller.run(low, np.full(wait, low))[-1]  # P on PV without integral does not rest where it is put
+    u = scale.output_percent(controller.run(low, np.full(wait + watched, after))) - scale.output_percent(np.array(still))
     ramp = float(u[-1] - u[wait - 1]) / watched if a.ki or a.dahlin else 0.0
     scans = np.arange(u.size) + _SHARE.get(a.integral_rule, 1.0) - a.previous_pv
     level = u - ramp * scans
     jump = _clean(float(level[wait - 1]), step)
-    kick, settles = _kick(level[:wait], jump, h) if a.kd else (0.0, 0.0)
+    kick, settles = _kick(u[:wait], level[:wait] - jump, jump, h) if a.kd else (0.0, 0.0)
     return _Move(jump, kick, settles, _clean(ramp * 60 / h, step))
 
 
-def _kick(level: npt.NDArray[np.float64], jump: float, h: float) -> tuple[float, float]:
+def _kick(u: Floats, excess: Floats, jump: float, h: float) -> tuple[float, float]:
     """Return the largest move on the way, and how long until less than 1 % of it is left [s]; zeros where it does not overshoot."""
-    excess = level - jump
     worst = int(np.argmax(np.abs(excess)))
     peak = float(excess[worst])
     if not peak or abs(jump + peak) <= 1.01 * abs(jump):
         return 0.0, 0.0
     left = np.flatnonzero(np.abs(excess) > 0.01 * abs(peak))
-    return float(level[worst]), float(left[-1] + 1) * h
+    return float(u[worst]), float(left[-1] + 1) * h
 
 
 def _scans_to_die_out(settings: Settings, h: float) -> int:
     """Return after how many scans nothing is left of filters and derivative."""
-    a = settings.algorithm(scan=h)
     den = np.trim_zeros(np.asarray(settings.law(h).feedback.den, dtype=float), "b")
     poles = 1 / np.roots(den[::-1]) if den.size > 1 else np.array([])
-    if a.ki or a.dahlin:  # the integrator's own pole stays
-        poles = np.delete(poles, np.argmin(np.abs(poles - 1))) if poles.size else poles
+    poles = poles[np.abs(poles - 1) > _INTEGRATOR]
     slowest = float(np.max(np.abs(poles))) if poles.size else 0.0
     scans = math.log(_DEAD) / math.log(slowest) if 0 < slowest < 1 else 0.0
     return min(math.ceil(scans) + 8, _LONGEST)  # differences reach back over four scans at most
