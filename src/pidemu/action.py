@@ -66,13 +66,13 @@ def switch_position(settings: Settings, action: Action) -> Action:
     return _OTHER[action] if turned else action
 
 
-def acting_alike(source: Settings, target: Settings, factor: float) -> tuple[Action, Action]:
+def acting_alike(target: Settings, factor: float) -> tuple[Action, Action]:
     """Return the actions to run two controllers with so that both act alike.
 
     Parameters
     ----------
-    source, target : Settings
-        The two.
+    target : Settings
+        The second of the two, whose gains were made from the first one's.
     factor : float
         What the source's gains were multiplied by to give the target's; negative where one of the two is switched to direct.
     """
@@ -160,8 +160,5 @@ def check_action(settings: Settings, action: Action | None) -> str:
 def _sign(settings: Settings) -> float:
     """Return the sign of the gains, positive where the output falls when the measurement rises; 0 without any."""
     a = settings.algorithm()
-    if a.dahlin is not None:
-        gain = a.dahlin.gain
-    else:
-        gain = a.kp or a.ki or a.kd
+    gain = a.dahlin.gain if a.dahlin is not None else a.kp or a.ki or a.kd
     return (gain > 0) - (gain < 0)

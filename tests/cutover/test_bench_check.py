@@ -31,7 +31,9 @@ CASES = [  # dials, scan [s], and by hand for an error of 10 %: jump [%], ramp [
 
 
 @pytest.mark.parametrize(("name", "dials", "scan", "jump", "ramp"), CASES)
-def test_jump_and_ramp_are_those_worked_out_by_hand(name: str, dials: dict[str, Any], scan: float, jump: float, ramp: float) -> None:
+def test_jump_and_ramp_are_those_worked_out_by_hand(
+    name: str, dials: dict[str, Any], scan: float, jump: float, ramp: float
+) -> None:
     check = bench_check(settings(name, **dials), scan)
     per_ten = 10 / check.step
     # 1e-4: four digits; the hand-made figures have five, and so have the dials

@@ -88,9 +88,7 @@ def noise_gain(settings: Settings, scan: float | None = None) -> float:
     return float(abs(num[-1] / den[-1])) if num.size == den.size and num.size else 0.0
 
 
-def noise_change(
-    source: Settings, target: Settings, scans: tuple[float, float] | None = None, factor: float = 1.0
-) -> NoiseChange:
+def noise_change(source: Settings, target: Settings, scans: tuple[float, float] | None = None, factor: float = 1.0) -> NoiseChange:
     """Return what a conversion does to the noise on the output.
 
     There is a sentence where the target differentiates and scans faster, or has a shorter filter, and wherever the noise gain rises

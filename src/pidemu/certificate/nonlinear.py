@@ -99,7 +99,7 @@ def _trials(both: tuple[Side, Side], trial: Plan) -> _Outcomes:
     if source.settings.pv_range and target.settings.pv_range:
         span = source.settings.spans.pv / target.settings.spans.pv
     done = []
-    actions = acting_alike(source.settings, target.settings, source.sign * target.sign)
+    actions = acting_alike(target.settings, source.sign * target.sign)
     for side, action, share in zip(both, actions, (1.0, span), strict=True):
         try:
             done.append(tried(side, trial, action, share))

@@ -100,7 +100,7 @@ def emulated(
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
-    actions = acting_alike(source, target, factor)
+    actions = acting_alike(target, factor)
     mine, theirs = _Bench(source, scans[0], actions[0]), _Bench(target, scans[1], actions[1])
     ours = REST + abs(factor) * (mine.outputs(record) - REST)
     apart = _apart(ours, theirs.outputs(other)[at])

@@ -102,9 +102,11 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
     --------
     >>> import pidemu
     >>> s = pidemu.load_card("allen-bradley/pide").settings(PGain=1.8, IGain=1.25, DependIndepend="true")
-    >>> bench_check(s, 0.5, "reverse").text
-    'In automatic, with PV at SP and the output half way, move PV up by 10 %: the output falls by 18 % and goes on falling at 14.4 % \
-per minute.'
+    >>> check = bench_check(s, 0.5, "reverse")
+    >>> check.text.partition("move ")[2]
+    'PV up by 10 %: the output falls by 18 % and goes on falling at 14.4 % per minute.'
+    >>> check.step, round(check.jump, 9), round(check.ramp_per_minute, 9)
+    (10.0, -18.0, -14.4)
     """
     h = default_scan(settings.equation) if scan is None else float(scan)
     known = action or carried_action(settings)

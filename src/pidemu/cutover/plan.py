@@ -125,9 +125,7 @@ def transfer_plan(
         raise ScanError(contradiction)
     if stated is not None:
         return _plan(bench_for(target, (sp, pv, op), scan, stated, output_limits))
-    either, direct = (
-        _plan(replace(bench_for(target, (sp, pv, op), scan, a, output_limits), action_known=False)) for a in ACTIONS
-    )
+    either, direct = (_plan(replace(bench_for(target, (sp, pv, op), scan, a, output_limits), action_known=False)) for a in ACTIONS)
     if not _same(either, direct):
         raise ActionError(
             f"{target.card.id}: what to set at this cut-over depends on the action of the loop, which was not stated; add --action "

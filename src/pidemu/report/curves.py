@@ -207,7 +207,7 @@ def _trace(
     moved = REST + np.where(times >= when[0] - 1e-6 * h, size, 0.0)
     still = np.full(times.size, REST)
     record = Record(sp=moved, pv=still) if moves == "setpoint" else Record(sp=still, pv=moved)
-    action = acting_alike(c.source, c.settings, c.factor)[0 if who == "source" else 1]
+    action = acting_alike(c.settings, c.factor)[0 if who == "source" else 1]
     run = run_on(record, moves, settings, who, (h, h), action, WIDE, REST, [])
     factor = abs(c.factor) if who == "source" else 1.0
     outputs: Floats = REST + factor * (run.playback.outputs - REST)
