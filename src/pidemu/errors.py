@@ -9,6 +9,7 @@
     ├── SettingError         a setting or option of a card is unknown, missing or out of range
     │   └── UndefinedError   a combination of options that makes no controller
     ├── ScanError            an algorithm cannot be run at this scan interval or with these limits
+    │   └── ActionError      what to do depends on the action of the loop, which was not stated
     ├── EngineError          a back end is not there, or cannot run what it is asked to
     ├── FleetError           a fleet of loops cannot be read or run as asked
     ├── RecordError          a recorded signal file cannot be used
@@ -111,6 +112,10 @@ class UndefinedError(SettingError):
 
 class ScanError(PidemuError):
     """An algorithm cannot be run as asked: scan interval, limits, engine or signals."""
+
+
+class ActionError(ScanError):
+    """What to do depends on the action of the loop, direct or reverse, which was not stated."""
 
 
 class EngineError(PidemuError):

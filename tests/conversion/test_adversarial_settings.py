@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.action import switch_position
 from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
 from pidemu.settings import Settings, off_values
 from pidemu.units import Role
@@ -47,9 +48,10 @@ def test_with_the_action_that_the_warnings_say_both_outputs_move_the_same_way(so
         if conversion is None:
             assert "no proportional action" in reason
             continue
-        turned = any("gains are negative" in w or "is direct acting, by the sign" in w for w in conversion.warnings)
-        assert turned == (conversion.factor < 0)
-        after = first_moves(conversion.settings, "direct" if turned else "reverse")
+        assert (conversion.action is None) == (not old.equation.action.fixed)  # a sign says it, a switch does not
+        said = switch_position(conversion.settings, conversion.action or "reverse")
+        assert conversion.settings.equation.action.names[said] in conversion.action_text
+        after = first_moves(conversion.settings, said)
         assert math.copysign(1, after[1]) == math.copysign(1, before[1]), target
         if dials.get("Kp") != 0:
             assert math.copysign(1, after[0]) == math.copysign(1, before[0]), target
@@ -66,7 +68,7 @@ def test_where_the_sign_is_the_action_the_words_of_the_card_are_what_the_control
     conversion = pidemu.convert(source, target, given=needed(pidemu.load_card(target)), emulate=False)
     s = conversion.settings
     names = s.equation.action.names
-    assert any(f"'{names['reverse']}' on {target}" in w for w in conversion.warnings)
+    assert any(w.startswith(f"action: reverse acting, SP - PV: {names['reverse']}; direct") for w in conversion.warnings)
     gain = next(v for v in s.values() if v.role is Role.GAIN)
     assert (gain.value > 0) == names["reverse"].startswith("positive")
     parallel = s.equation.form == "parallel"
@@ -83,8 +85,8 @@ def test_where_the_sign_is_the_action_the_target_is_told_one_action_and_no_choic
     assert first_moves(conversion.source, "reverse")[0] == pytest.approx(2, abs=0.1)
     assert first_moves(conversion.settings, "direct")[0] == pytest.approx(2, abs=0.1)
     words = " ".join(conversion.warnings)
-    assert "set the action to 'Direct'" in words
-    assert "to 'Reverse' where" not in words
+    assert "action: direct acting, PV - SP: Direct; on " in words
+    assert "reverse acting" not in words
 
 
 ENDS: list[tuple[str, dict[str, object], str, float, str, dict[str, object]]] = [

@@ -146,7 +146,9 @@ def test_negative_gains_become_positive_ones_with_the_other_action() -> None:
     conversion = pidemu.convert(source, "emerson/deltav")
     assert (conversion.settings["GAIN"].value, conversion.settings["RESET"].value) == (2, 40)
     assert conversion.verdict == "exact"
-    assert any("gains are negative" in w and "'Direct' where the source was reverse acting" in w for w in conversion.warnings)
+    direct = "direct acting, PV - SP"
+    assert conversion.action_text == f"{direct}: Direct_Acting on in CONTROL_OPTS"  # the source has no switch: its sign says it
+    assert f"action: {conversion.action_text}; on simple-pid/simple-pid: {direct}: negative gains" in conversion.warnings
     sp, pv = np.full(50, 50.0), 50 + np.sin(np.arange(50) / 5)
     old = pidemu.Controller(source, 1.0, output_limits=(-1e6, 1e6)).run(sp, pv)
     new = pidemu.Controller(conversion.settings, 1.0, "direct", output_limits=(-1e6, 1e6)).run(sp, pv)

@@ -122,7 +122,7 @@ def increment(s: Settings, e: float) -> float:
 
 
 def plan_for(name: str, *, sp: float = SP, pv: float = PV, op: float = OP, **dials: Any) -> TransferPlan:
-    return transfer_plan(pidemu.load_card(name).settings(**dials), sp, pv, op)
+    return transfer_plan(pidemu.load_card(name).settings(**dials), sp, pv, op, action="reverse")
 
 
 def sentences(plan: TransferPlan) -> str:

@@ -11,7 +11,7 @@ from tests.cutover.bench import OP, PV, SP, WIDE, E, defined, followed, incremen
 @on_every_card
 def test_following_the_plan_moves_the_output_by_one_increment_of_the_integral_at_most(name: str) -> None:
     for s in defined(pidemu.load_card(name)):
-        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE)
+        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE, action="reverse")
         precision = s.algorithm().precision
         # rounding of 24 bits in signals of 50 and terms of a few hundred; one count of the output
         assert plan.resolution <= {"float64": 1e-9, "float32": 1e-3, "integer": 0.011}[precision], s.summary
@@ -28,7 +28,7 @@ def test_following_the_plan_moves_the_output_by_one_increment_of_the_integral_at
 @on_every_card
 def test_what_the_plan_avoids_in_the_first_scan_does_not_come_in_the_second(name: str) -> None:
     for s in defined(pidemu.load_card(name)):
-        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE)
+        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE, action="reverse")
         if plan.is_bumpless:
             u = followed(plan, s, scans=4)
             # with constant signals the integral goes on at one rate, behind a filter on the output at less; counts come singly
@@ -40,7 +40,7 @@ def test_what_the_plan_avoids_in_the_first_scan_does_not_come_in_the_second(name
 @on_every_card
 def test_without_the_plan_the_output_moves_as_a_plain_switch_to_automatic_shows(name: str) -> None:
     for s in defined(pidemu.load_card(name)):
-        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE)
+        plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE, action="reverse")
         ctl = Controller(s, output_limits=WIDE, initial_output=OP)
         if s.algorithm().start != "running":
             ctl.run(SP, [PV] * 400, auto=False, manual=OP)

@@ -171,12 +171,12 @@ def with_bias(**dial: Any) -> Card:
 
 @pytest.mark.parametrize("op", [OP, 2 * E])
 def test_a_bias_that_has_a_dial_is_set_there(op: float) -> None:
-    plan = transfer_plan(with_bias().settings(kp=2.0), SP, PV, op)
+    plan = transfer_plan(with_bias().settings(kp=2.0), SP, PV, op, action="reverse")
     assert numbers(plan)["MR"] == op - 2 * E  # 0 as well, in place of the 50 of the dial
     assert (plan.bump, plan.without_plan) == (0.0, 50 + 2 * E - op)
 
 
 def test_a_bias_beyond_its_dial_leaves_a_bump_that_is_stated() -> None:
-    plan = transfer_plan(with_bias(range=[0, 10], default=5).settings(kp=2.0), SP, PV, OP)
+    plan = transfer_plan(with_bias(range=[0, 10], default=5).settings(kp=2.0), SP, PV, OP, action="reverse")
     assert plan.bump == 5 + 2 * E - OP
     assert any(f"a bump of {5 + 2 * E - OP:g} % of span remains" in note for note in plan.notes)

@@ -79,7 +79,7 @@ def test_advanced_pid_itself_goes_on_from_the_output_with_the_integral_that_the_
     ],
 )
 def test_the_plan_says_whether_what_it_sets_is_stated(name: str, dials: dict[str, Any], note: str) -> None:
-    plan = transfer_plan(pidemu.load_card(name).settings(**dials), SP, PV, OP, output_limits=(0.0, 100.0))
+    plan = transfer_plan(pidemu.load_card(name).settings(**dials), SP, PV, OP, output_limits=(0.0, 100.0), action="reverse")
     assert [note in found for found in on_presets(plan)] == [True]
 
 
@@ -100,7 +100,7 @@ def test_where_nothing_is_preset_the_plan_does_not_speak_of_it(name: str, dials:
 @pytest.mark.parametrize("preset", ["output", "none"])
 def test_an_output_that_can_be_given_spares_the_setpoint_its_detour(preset: str) -> None:
     s = made_up_card(transfer={"start": "load-output", "preset": preset}).settings(kp=2.0, ki=0.25)
-    plan = transfer_plan(s, SP, PV, OP)
+    plan = transfer_plan(s, SP, PV, OP, action="reverse")
     assert numbers(plan) == {"SP": SP, "OP": OP, "load": OP - 2 * E} if preset == "output" else {"SP": PV, "OP": OP}
     assert plan.is_bumpless
     assert plan.without_plan == 2 * E

@@ -33,7 +33,7 @@ def test_an_output_at_its_limit_that_the_integral_pushes_further_is_no_bump() ->
     plan = plan_for("generic/standard", op=100.0, K=2, Ti=20)
     assert plan.bump == 0.0
     tracked = made_up_card(transfer={"start": "tracked"}).settings(kp=2.0, ki=0.25)
-    assert transfer_plan(tracked, SP, PV, 99.5).bump == 0.0  # one increment is 1
+    assert transfer_plan(tracked, SP, PV, 99.5, action="reverse").bump == 0.0  # one increment is 1
 
 
 def test_an_integral_whose_limits_are_too_narrow_leaves_a_bump_that_is_stated() -> None:
@@ -57,9 +57,9 @@ def test_engineering_ranges_are_those_of_the_signals_and_of_the_steps() -> None:
 @pytest.mark.parametrize("op", [4.1, 19.3])
 def test_an_output_at_a_limit_in_engineering_units_is_within_it(op: float) -> None:
     s = pidemu.load_card("generic/standard").settings(K=2, Ti=20, op_range=(4.1, 19.3))
-    assert transfer_plan(s, SP, PV, op).is_bumpless
+    assert transfer_plan(s, SP, PV, op, action="reverse").is_bumpless
     with pytest.raises(ScanError, match=r"the output of 19.4 eu is outside the output limits, 4.1 eu to 19.3 eu"):
-        transfer_plan(s, SP, PV, 19.4)
+        transfer_plan(s, SP, PV, 19.4, action="reverse")
 
 
 def test_a_card_in_engineering_units_takes_the_signals_as_they_are() -> None:
@@ -72,7 +72,7 @@ def test_a_card_in_engineering_units_takes_the_signals_as_they_are() -> None:
 
 def test_the_numbers_in_the_sentences_are_those_that_are_set() -> None:
     for name in PIDS:
-        for step in transfer_plan(typical(pidemu.load_card(name), {}), SP, PV, OP, output_limits=WIDE).steps:
+        for step in transfer_plan(typical(pidemu.load_card(name), {}), SP, PV, OP, output_limits=WIDE, action="reverse").steps:
             for value in step.set.values():
                 assert f"{value:.6g}" in step.do
 
@@ -95,4 +95,4 @@ def test_an_output_outside_the_limits_is_refused_with_the_limits_and_the_remedy(
     with pytest.raises(ScanError, match=r"the output of 43 % is outside the output limits, -1 % to 1 %.*output_limits"):
         plan_for("modelica/limpid")
     s = pidemu.load_card("modelica/limpid").settings(k=2, Ti=5, Td=0)
-    assert transfer_plan(s, SP, PV, OP, output_limits=(0, 100)).is_bumpless
+    assert transfer_plan(s, SP, PV, OP, output_limits=(0, 100), action="reverse").is_bumpless

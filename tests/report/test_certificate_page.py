@@ -66,7 +66,7 @@ def made(name: str) -> Conversion:
 @cache
 def page(name: str) -> str:
     c = made(name)
-    return certificate_page(c, c.transfer_plan(50, 48, 40) if name == "arduino" else None)
+    return certificate_page(c, c.transfer_plan(50, 48, 40, "reverse") if name == "arduino" else None)
 
 
 def tree(text: str) -> ElementTree.Element:
@@ -255,7 +255,7 @@ def test_what_was_not_given_is_not_covered() -> None:
 
 
 def test_a_plan_for_the_cut_over_is_printed_where_there_is_one() -> None:
-    plan = made("arduino").transfer_plan(50, 48, 40)
+    plan = made("arduino").transfer_plan(50, 48, 40, "reverse")
     [found] = [s for s in tree(page("arduino")).iter("section") if words(s.find("h2")) == "Cut-over"]
     assert [words(item) for item in found.findall("ol/li")] == [" ".join(step.do.split()) for step in plan.steps]
     assert [words(item) for item in found.findall("ul/li")] == [" ".join(note.split()) for note in plan.notes]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from pidemu.action import acting_alike
 from pidemu.card.at_limits import limit_rows
 from pidemu.card.stages import STARTS
 from pidemu.certificate.arithmetic import arithmetic_differences
@@ -98,9 +99,10 @@ def _trials(both: tuple[Side, Side], trial: Plan) -> _Outcomes:
     if source.settings.pv_range and target.settings.pv_range:
         span = source.settings.spans.pv / target.settings.spans.pv
     done = []
-    for side, share in ((source, 1.0), (target, span)):
+    actions = acting_alike(target.settings, source.sign * target.sign)
+    for side, action, share in zip(both, actions, (1.0, span), strict=True):
         try:
-            done.append(tried(side, trial, "reverse" if side.sign == source.sign else "direct", share))
+            done.append(tried(side, trial, action, share))
         except PidemuError as error:
             return _Outcomes(None, f"not emulated, since {side.name} cannot be: {error}")
     return _Outcomes((done[0], done[1]))

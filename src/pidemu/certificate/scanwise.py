@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.action import acting_alike
 from pidemu.canonical import default_scan
 from pidemu.certificate.linear import time_scale
 from pidemu.certificate.models import EXACT, ScanByScan
@@ -99,7 +100,8 @@ def emulated(
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
-    mine, theirs = _Bench(source, scans[0], "reverse"), _Bench(target, scans[1], "reverse" if factor > 0 else "direct")
+    actions = acting_alike(target, factor)
+    mine, theirs = _Bench(source, scans[0], actions[0]), _Bench(target, scans[1], actions[1])
     ours = REST + abs(factor) * (mine.outputs(record) - REST)
     apart = _apart(ours, theirs.outputs(other)[at])
     exact = bool(np.max(apart) <= EXACT * 100)  # then they agree on the measurement alone as well

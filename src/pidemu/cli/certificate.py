@@ -93,6 +93,7 @@ def condition_line(condition: object) -> str:
 def print_plan(plan: TransferPlan) -> None:
     """Print how to change over."""
     heading("\nCut-over")
+    wrapped(f"for {plan.action_text}", "  ")
     for i, step in enumerate(plan.steps, 1):
         wrapped(step.do, f"  {i}. ")
     click.echo(f"  the output then moves by {_bump(plan.bump)} % of span; without this, by {_bump(plan.without_plan)} %")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,8 +15,12 @@ from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import DIGITS
-from pidemu.errors import ConversionRefusedError, QuestionError, SettingError
+from pidemu.errors import ActionError, ConversionRefusedError, QuestionError, SettingError
 from pidemu.settings import Settings
+
+if TYPE_CHECKING:
+    from pidemu.conversion.result import Conversion
+    from pidemu.cutover.plan import TransferPlan
 
 
 def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> str | None:
@@ -95,6 +99,12 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option(
     "--cut-over", "now", metavar="SP,PV,OP", help="Setpoint, measurement and output now: how to change over without a bump."
 )
+@click.option(
+    "--action",
+    type=click.Choice(["reverse", "direct"]),
+    help="Action of the loop. Reverse: the output falls when the measurement rises (error SP - PV). Needed where a cut-over "
+    "depends on it; where the sign of the gain is the action it is known.",
+)
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
@@ -122,6 +132,7 @@ def command(
     to_pv_range: tuple[float, float] | None,
     to_op_range: tuple[float, float] | None,
     now: str | None,
+    action: str | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -174,21 +185,34 @@ def command(
     except ConversionRefusedError as error:
         print_refusal(error, source, goal, as_json)
         raise SystemExit(1) from None
-    plan = None if now is None else conversion.transfer_plan(*_signals(now))
+    plan, not_known = _plan(conversion, now)
     if page is not None:
         from pidemu.report.certificate import write_page
 
         write_page(page, conversion, plan)
     if as_json:
         print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
-        return
-    print_conversion(conversion)
-    if plan is not None:
-        print_plan(plan)
-    if explain:
-        print_explanation(conversion)
-    if page is not None:
-        click.echo(f"\nwritten: {page}")
+    else:
+        print_conversion(conversion)
+        if plan is not None:
+            print_plan(plan)
+        if explain:
+            print_explanation(conversion)
+        if page is not None:
+            click.echo(f"\nwritten: {page}")
+    if not_known is not None:
+        click.echo(f"error: {not_known}", err=True)
+        raise SystemExit(1)
+
+
+def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:
+    """Return how to change over, or why that is not known; the conversion itself does not depend on the action."""
+    if now is None:
+        return None, None
+    try:
+        return conversion.transfer_plan(*_signals(now)), None
+    except ActionError as error:
+        return None, error
 
 
 def _only_reading(

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from pidemu.settings import Settings
+from pidemu.action import action_line
 from pidemu.units import Role
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
-
-_NOISE: Final = 1.25
-"""Ratio of high-frequency gains from which noise is worth a word."""
 
 
 def warnings_for(c: Conversion) -> Iterator[str]:
@@ -29,11 +26,13 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     yield from _ranges(c)
     yield from _setpoint(c)
     yield from _multiplier(c)
-    yield from _noise(c)
+    noise = noise_change(c.source, c.settings, c.scan, c.factor).text
+    if noise:
+        yield noise
     yield from (difference.text for difference in c.certificate.nonlinear)
     if c.certificate.not_emulated:
         yield f"the two were not run against each other: {c.certificate.not_emulated}"
-    yield from _action(c.source, c.settings)
+    yield from _action(c)
     yield from _scan(c)
 
 
@@ -42,17 +41,6 @@ def _ranges(c: Conversion) -> Iterator[str]:
         yield (
             f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
             "engineering units"
-        )
-    direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
-    if c.factor < 0 and c.source.equation.action.fixed:
-        yield (
-            f"with these settings {c.source.card.id} is direct acting, by the sign of its gain: set the action to '{direct}' on "
-            f"{c.settings.card.id}"
-        )
-    elif c.factor < 0:
-        yield (
-            f"the source's gains are negative: these are positive, so set the action to '{direct}' where the source was reverse "
-            f"acting, to '{reverse}' where it was direct acting"
         )
     for s in (c.source, c.settings):
         if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
@@ -110,28 +98,14 @@ def _alike(x: float, y: float) -> bool:
     return x == y or math.isclose(x, y, rel_tol=0.02)
 
 
-def _noise(c: Conversion) -> Iterator[str]:
-    high = c.certificate.feedback.full_band.high
-    source, target = (abs(complex(s.law().response(high))) for s in (c.source, c.settings))
-    ratio = target / (source * abs(c.factor)) if source else math.inf
-    if ratio > _NOISE:
-        yield f"measurement noise: at {high:.3g} rad/s the target's gain is {ratio:.3g} times the source's"
-    elif 0 < ratio < 1 / _NOISE:
-        yield f"measurement noise: at {high:.3g} rad/s the target's gain is only {ratio:.3g} times the source's"
-
-
-def _action(source: Settings, target: Settings) -> Iterator[str]:
-    if target.equation.action.fixed and not source.equation.action.fixed:
-        yield (
-            f"action: {target.card.id} has no choice of it, the sign of the gains decides; these are for a loop that was reverse "
-            f"acting, '{source.equation.action.names['reverse']}' on {source.card.id}: where it was direct acting, turn their sign"
-        )
-    old, new = source.equation.action.names, target.equation.action.names
-    if {k: v.casefold() for k, v in old.items()} != {k: v.casefold() for k, v in new.items()}:
-        yield (
-            f"action: reverse acting (output falls when the measurement rises) is '{old['reverse']}' on {source.card.id} and "
-            f"'{new['reverse']}' on {target.card.id}"
-        )
+def _action(c: Conversion) -> Iterator[str]:
+    """Yield what the action is set to, where it is not the same word on both."""
+    old, new = c.source.equation.action, c.settings.equation.action
+    same = {k: v.casefold() for k, v in old.names.items()} == {k: v.casefold() for k, v in new.names.items()}
+    turned = c.factor < 0 and not (old.fixed and new.fixed)
+    if same and not turned and old.fixed == new.fixed:
+        return
+    yield f"action: {c.action_text}; on {c.source.card.id}: {action_line(c.source, c.action)}"
 
 
 def _scan(c: Conversion) -> Iterator[str]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
+from pidemu.action import carried_action, check_action
+from pidemu.card.base import Form
 from pidemu.card.load import Card
 from pidemu.conversion.command import words_for
 from pidemu.conversion.modes import depends_on_mode
@@ -14,6 +16,7 @@ from pidemu.conversion.questions import Answer, Question
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
 from pidemu.settings import Settings
+from pidemu.units import Role
 
 
 def ask(questions: Sequence[Question], source: Settings, card: Card, request: Request) -> None:
@@ -47,6 +50,30 @@ def _worked_out(answer: Answer, source: Settings, card: Card, request: Request) 
         return replace(answer, command=command, outcome=f"refused: {refusal}")
     except PidemuError as error:
         return replace(answer, command=command, outcome=str(error))
+
+
+def action_questions(source: Settings, request: Request) -> list[Question]:
+    """Return the question for the action, where what was stated contradicts the sign of the source's gains."""
+    text = check_action(source, request.action)
+    carried = carried_action(source)
+    if not text or carried is None or request.action is None:
+        return []
+    turned = {n: -v.value for n, v in source.items() if v.given and v.role in _SIGNED[source.equation.form is Form.PARALLEL]}
+    return [
+        Question(
+            "action",
+            "action",
+            f"{source.card.id}: {text}. Which is right?",
+            (
+                Answer(carried, "the signs of the gains are right", asked={"action": carried}),
+                Answer(request.action, "the action is right, the gains have the other sign", given=turned),
+            ),
+        )
+    ]
+
+
+_SIGNED: Final = {False: (Role.GAIN,), True: (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)}
+"""Dials that carry the sign, of a parallel form and of the others."""
 
 
 def mode_is_open(source: Settings, ranking: tuple[Attempt, ...], request: Request) -> bool:

@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pidemu.action import switch_position
 from pidemu.card.base import Form
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
-from pidemu.conversion.asking import ask, mode_is_open, mode_question
+from pidemu.conversion.asking import action_questions, ask, mode_is_open, mode_question
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.modes import MODES, Mode
@@ -27,6 +28,7 @@ from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.scan.build import Action
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
@@ -79,7 +81,9 @@ def convert(
     mode : {"both", "auto", "cascade"}
         Which setpoint counts: the operator's, a remote one, or both.
     action : {"reverse", "direct"}, optional
-        The control action, reverse: the output falls when the measurement rises. The dials do not depend on it.
+        The control action, reverse: the output falls when the measurement rises (error SP - PV). The size of the dials does not
+        depend on it; where the sign of the target's gain is the action, the gain gets that sign. Where that of the source's is, it
+        is known without.
     to_pv_range, to_op_range : tuple, optional
         Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity
         rescales the gains, the same signal on another scale does not.
@@ -144,7 +148,7 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     _refuse_absurd_gains(source)
     source = _paced(source, request)
     opens = tuple(unstated(source))
-    ask([o.question for o in opens if o.asked], source, card, request)
+    ask([*action_questions(source, request), *(o.question for o in opens if o.asked)], source, card, request)
     work = _Work(source, card, request, aim)
     ranking = work.ranking()
     if mode_is_open(source, ranking, request):
@@ -231,7 +235,7 @@ class _Work:
                 request.pace[1],
             )
             goal.reject_missing()
-            sign = -1 if _is_negative(source, goal) else 1
+            sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
             return Solver(
                 source, goal, sign * self.factor, request.scan, request.process, compensate=request.compensate, mode=request.mode
             )
@@ -323,6 +327,12 @@ def _is_negative(source: Settings, target: Target) -> bool:
     """Whether the source has negative gains only, and the target no place for them: then the action changes instead."""
     a, gain = source.algorithm(), target.dial(Role.GAIN)
     return max(a.kp, a.ki, a.kd) <= 0 > min(a.kp, a.ki, a.kd) and gain is not None and limits(gain[1])[0] >= 0
+
+
+def _becomes_negative(source: Settings, target: Card, action: Action | None) -> bool:
+    """Whether the source's switch stands at direct, and the target has none, so that its gain carries the sign."""
+    switched = not source.equation.action.fixed and target.data.action.fixed
+    return switched and action is not None and switch_position(source, action) == "direct"
 
 
 def _shared(source: Settings, target: Card) -> dict[str, object]:

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from pidemu.action import read_action
 from pidemu.card.load import Card
 from pidemu.conversion.modes import Modes, read_mode
 from pidemu.conversion.rounding import checked_digits
@@ -15,11 +16,10 @@ from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
 from pidemu.reading import signal_range
+from pidemu.scan.build import Action
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
-
-Action = Literal["reverse", "direct"]
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ class Request:
                 yield from ("--runs-every", _intervals(self.scan))
         if self.mode != "both":
             yield from ("--mode", self.mode)
-        if self.action is not None:
-            yield from ("--action", self.action)
         for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
             if ends is not None:
                 yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
         if self.match is not None:
             yield from ("--match", self.match)
+        if self.action is not None:
+            yield from ("--action", self.action)
         if self.process is not None:
             yield from ("--process", written(self.process))
         if self.digits not in (None, DIGITS):
@@ -137,8 +137,6 @@ def read_request(
     spelled = {o.casefold(): o for o in card.options}
     chosen = {spelled.get(n.casefold(), n): x for n, x in named.items() if n.casefold() in spelled or n in (options or {})}
     dials = {n: x for n, x in named.items() if n.casefold() not in spelled and n not in (options or {})}
-    if action not in (None, "reverse", "direct"):
-        raise SettingError(f"action is '{action}'; it is reverse (the output falls when the measurement rises) or direct")
     real, pace = _intervals_of(scan, runs_every)
     return Request(
         options=chosen,
@@ -146,7 +144,7 @@ def read_request(
         scan=real,
         pace=pace,
         mode=read_mode(mode),
-        action="reverse" if action == "reverse" else "direct" if action == "direct" else None,
+        action=read_action(action),
         match=match,
         pv_range=signal_range(card, "pv_range", pv_range),
         op_range=signal_range(card, "op_range", op_range),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from pidemu.action import action_words, carried_action
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
@@ -18,7 +19,9 @@ from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
+from pidemu.errors import ScanError
 from pidemu.plain import json_safe
+from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
@@ -136,8 +139,15 @@ class Conversion:
 
     @cached_property
     def at_the_loop(self) -> tuple[str, ...]:
-        """What to do at the loop: the action, and a check on the bench before the cut-over."""
-        return ()
+        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+        from pidemu.cutover.bench_check import bench_check
+
+        lines = [f"action: {self.action_text}"]
+        try:
+            lines.append(f"bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
+        except ScanError as error:
+            lines.append(f"no bench check: {error}")
+        return tuple(lines)
 
     @cached_property
     def command(self) -> str:
@@ -149,17 +159,45 @@ class Conversion:
         """The setpoint filter that would make the setpoint paths agree; ``None`` where they do, or where no filter can."""
         return setpoint_filter(self.source.law(), self.settings.law(), self.factor)
 
-    def transfer_plan(self, sp: float, pv: float, op: float) -> TransferPlan:
+    @property
+    def action(self) -> Action | None:
+        """The loop's action: as it was stated, or as the sign of a gain carries it; ``None`` where it is not known."""
+        return self.request.action or carried_action(self.source)
+
+    @property
+    def action_text(self) -> str:
+        """What the target's action has to be set to, with the error formula; for both actions where it is not known."""
+        known = self.action
+        both: tuple[Action, ...] = ("reverse", "direct") if known is None else (known,)
+        return "; ".join(self._action_words(a) for a in both)
+
+    def _action_words(self, action: Action) -> str:
+        carried = carried_action(self.settings)
+        if carried is not None and carried != action:  # the gains are for the other action
+            return f"{action_words(self.settings, action)} (turn the sign of the gains, or convert with --action {action})"
+        return action_words(self.settings, action)
+
+    def transfer_plan(self, sp: float, pv: float, op: float, action: Action | None = None) -> TransferPlan:
         """Return what to set, and in which order, so that the cut-over to the target does not bump.
 
         Parameters
         ----------
         sp, pv, op : float
             Setpoint, measurement and output at the cut-over [engineering units where the ranges are given, else %].
+        action : {"reverse", "direct"}, optional
+            Action of the loop in the ISA sense; needed where the plan depends on it and it is not known (see `action`).
+
+        Raises
+        ------
+        ActionError
+            What to set depends on the action, which is not known.
+        ScanError
+            The action contradicts the sign of the gain, or the signals cannot be used.
         """
         from pidemu.cutover.plan import transfer_plan
 
-        return transfer_plan(self.settings, sp, pv, op, scan=self.scan[1] if self.scan else None)
+        scan = self.scan[1] if self.scan else None
+        return transfer_plan(self.settings, sp, pv, op, scan=scan, action=action or self.action)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -195,6 +233,7 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
+            "at_the_loop": list(self.at_the_loop),
             "command": self.command,
         }
         safe: dict[str, Any] = json_safe(plain)

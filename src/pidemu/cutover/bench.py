@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import copysign, isfinite
 
+from pidemu.action import switch_position
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import default_scan
 from pidemu.emulator import Controller
@@ -87,6 +88,8 @@ class Bench:
         Ranges of measurement and output.
     gain : float
         What the operator's number is multiplied by in manual; 0: the output is 0 there.
+    action_known : bool
+        Whether `action` is the loop's; otherwise it is one of the two that the plan holds for.
     """
 
     settings: Settings
@@ -100,6 +103,7 @@ class Bench:
     measured: Range
     out: Range
     gain: float = 1.0
+    action_known: bool = True
 
     @property
     def entry(self) -> float | None:
@@ -141,7 +145,8 @@ class Bench:
         settings, behind = self.settings, bias or 0.0
         if bias is not None and (dial := settings.by_role(Role.BIAS)) is not None:
             settings, behind = settings.changed({dial.name: self.on_dial(dial, bias)}), 0.0
-        return Controller(settings, self.scan, self.action, self.limits, bias=behind, initial_output=self.op)
+        position = switch_position(settings, self.action)
+        return Controller(settings, self.scan, position, self.limits, bias=behind, initial_output=self.op)
 
     def on_dial(self, dial: Value, bias: float) -> float:
         """Return the value on a dial, in its unit, that makes a bias [own output units]."""

@@ -22,7 +22,7 @@ def notes(bench: Bench, way: Way, cut: Cut) -> Iterator[str]:
     if way.bias is not None and bench.settings.by_role(Role.BIAS) is None:
         yield f"{card} names no setting for a bias; without it the output moves as without the plan"
     if cut.increment:
-        yield f"the integral adds {bench.out.percent(cut.increment):.6g} % of span per scan: that is control and no bump"
+        yield f"{_increment(bench, cut)}: that is control, not a bump"
     if way.sp != bench.sp:
         follows = (
             "in manual its setpoint follows the measurement, and stays there" if bench.a.sp_tracks else "it starts at an error of 0"
@@ -36,6 +36,14 @@ def notes(bench: Bench, way: Way, cut: Cut) -> Iterator[str]:
     if bench.settings.equation.signals == "engineering" and None in ranges:
         yield f"{card} computes in engineering units, and not all ranges were given: spans not given are taken as 100"
     yield from _left(bench, cut, card)
+
+
+def _increment(bench: Bench, cut: Cut) -> str:
+    """Return what the integral does in a scan; which way only where the action is known."""
+    size = f"{abs(bench.out.percent(cut.increment)):.6g} % of span per scan"
+    if not bench.action_known:
+        return f"the integral moves the output by {size}, up or down according to the action"
+    return f"the integral {'raises' if cut.increment > 0 else 'lowers'} the output by {size}"
 
 
 def _what_starts(bench: Bench, way: Way, card: str) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from pidemu.cutover.bench import bench_for
+from pidemu.action import ACTIONS, action_line, action_words, carried_action, check_action
+from pidemu.cutover.bench import Bench, bench_for
 from pidemu.cutover.notes import notes
 from pidemu.cutover.steps import Step, steps
 from pidemu.cutover.trials import NO_BUMP, cut_over, resolution
 from pidemu.cutover.ways import best_way, simple_way
+from pidemu.errors import ActionError, ScanError
 from pidemu.plain import json_safe
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
@@ -32,6 +34,10 @@ class TransferPlan:
         controller without manual is then in its first scan of all.
     resolution : float
         Up to which a bump is none: the rounding of the card's arithmetic [% of output span].
+    action : {"reverse", "direct"} or None
+        Action of the loop that the plan is for; ``None``: it holds for both.
+    action_text : str
+        The same in the card's words, with the error formula.
     notes : tuple of str
         What the plan rests on, and what cannot be avoided and why.
     """
@@ -41,6 +47,8 @@ class TransferPlan:
     without_plan: float
     notes: tuple[str, ...]
     resolution: float = NO_BUMP
+    action: Action | None = None
+    action_text: str = ""
 
     @property
     def is_bumpless(self) -> bool:
@@ -55,6 +63,8 @@ class TransferPlan:
             "without_plan": self.without_plan,
             "is_bumpless": self.is_bumpless,
             "resolution": self.resolution,
+            "action": self.action,
+            "action_text": self.action_text,
             "notes": list(self.notes),
         }
         safe: dict[str, Any] = json_safe(plain)
@@ -68,7 +78,7 @@ def transfer_plan(
     op: float,
     *,
     scan: float | None = None,
-    action: Action = "reverse",
+    action: Action | None = None,
     output_limits: tuple[float, float] | None = None,
 ) -> TransferPlan:
     """Return what to set on the target, and in which order, so that the cut-over does not move the output.
@@ -86,15 +96,19 @@ def transfer_plan(
         Output at the cut-over, where the valve stands [engineering units where the settings have an `op_range`, else % of span].
     scan : float, optional
         Scan interval [s]; by default the card's.
-    action : {"reverse", "direct"}
-        Control action in the ISA sense, as for `Controller`.
+    action : {"reverse", "direct"}, optional
+        Action of the loop in the ISA sense: reverse acting, the output falls when the measurement rises. Where the sign of the gain
+        is the action it is known without; elsewhere it is needed where the plan depends on it.
     output_limits : tuple of float, optional
         Low and high output limit [as `op`]; by default the card's.
 
     Raises
     ------
     ScanError
-        A signal is not a finite number, the output is outside its limits, or the controller cannot be run so.
+        A signal is not a finite number, the output is outside its limits, the controller cannot be run so, or the action
+        contradicts the sign of the gain.
+    ActionError
+        What to set depends on the action, which was not stated.
 
     Examples
     --------
@@ -106,13 +120,38 @@ def transfer_plan(
     >>> plan.steps[2].do
     'load the integral with 39 %, and not with the output of 43 %: the proportional term of 4 % comes on top'
     """
-    bench = bench_for(target, (sp, pv, op), scan, action, output_limits)
+    stated = action or carried_action(target)
+    if contradiction := check_action(target, action):
+        raise ScanError(contradiction)
+    if stated is not None:
+        return _plan(bench_for(target, (sp, pv, op), scan, stated, output_limits))
+    either, direct = (_plan(replace(bench_for(target, (sp, pv, op), scan, a, output_limits), action_known=False)) for a in ACTIONS)
+    if not _same(either, direct):
+        raise ActionError(
+            f"{target.card.id}: what to set at this cut-over depends on the action of the loop, which was not stated; add --action "
+            f"reverse or --action direct (action= from Python): {action_line(target)}"
+        )
+    return either
+
+
+def _same(one: TransferPlan, other: TransferPlan) -> bool:
+    """Tell whether two plans say the same, but for rounding."""
+    near = max(one.resolution, other.resolution)
+    moves = ((one.bump, other.bump), (one.without_plan, other.without_plan))
+    return (one.steps, one.notes) == (other.steps, other.notes) and all(abs(x - y) <= near for x, y in moves)
+
+
+def _plan(bench: Bench) -> TransferPlan:
+    """Return the plan for one action."""
     way, cut = best_way(bench)
     bare = cut_over(bench, simple_way(bench))
+    known = bench.action_known
     return TransferPlan(
         steps=tuple(steps(bench, way, cut)),
-        bump=bench.out.percent(cut.bump),
-        without_plan=bench.out.percent(bare.bump),
+        bump=bench.out.percent(cut.bump) + 0.0,
+        without_plan=bench.out.percent(bare.bump) + 0.0,
         notes=tuple(notes(bench, way, cut)),
         resolution=resolution(bench, cut),
+        action=bench.action if known else None,
+        action_text=action_words(bench.settings, bench.action) if known else f"either action ({action_line(bench.settings)})",
     )

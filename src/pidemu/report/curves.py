@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.action import acting_alike
 from pidemu.certificate.scanwise import WIDE
 from pidemu.comparison.side_by_side import run_on
 from pidemu.conversion.result import Conversion
@@ -17,7 +18,6 @@ from pidemu.law import Law
 from pidemu.rational import Response
 from pidemu.record.files import Record
 from pidemu.record.standard import REST, scale_of
-from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 Floats = npt.NDArray[np.float64]
@@ -207,7 +207,7 @@ def _trace(
     moved = REST + np.where(times >= when[0] - 1e-6 * h, size, 0.0)
     still = np.full(times.size, REST)
     record = Record(sp=moved, pv=still) if moves == "setpoint" else Record(sp=still, pv=moved)
-    action: Action = "direct" if who != "source" and c.factor < 0 else "reverse"
+    action = acting_alike(c.settings, c.factor)[0 if who == "source" else 1]
     run = run_on(record, moves, settings, who, (h, h), action, WIDE, REST, [])
     factor = abs(c.factor) if who == "source" else 1.0
     outputs: Floats = REST + factor * (run.playback.outputs - REST)
