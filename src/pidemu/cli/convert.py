@@ -69,11 +69,6 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Which setpoint counts: the operator's, a remote one, or both.",
 )
 @click.option(
-    "--action",
-    type=click.Choice(["reverse", "direct"]),
-    help="Control action; reverse: the output falls when PV rises. The dials do not depend on it, the cut-over does.",
-)
-@click.option(
     "--match",
     metavar="MATCH",
     callback=_match,
@@ -119,7 +114,6 @@ def command(
     runs_every: float | tuple[float, float] | None,
     compensate: bool,
     mode: str,
-    action: str | None,
     match: str | None,
     process: str | None,
     explain: bool,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from pidemu.action import action_line
+from pidemu.certificate.noise import noise_change
 from pidemu.units import Role
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from pidemu.card.base import Form, Status
 from pidemu.card.models import Equation
 from pidemu.card.references import is_active
 from pidemu.certificate.models import RANK, Certificate
+from pidemu.certificate.noise import noise_gain
 from pidemu.conversion.evidence import filter_status
-from pidemu.conversion.modes import in_mode, law_in, looked_at
-from pidemu.conversion.noise import high_frequency_gain, noise_ratio
+from pidemu.conversion.modes import in_mode, looked_at
 from pidemu.conversion.rounding import rounding_error
 from pidemu.conversion.solve import Solver
 from pidemu.settings import Settings
@@ -230,10 +230,11 @@ def _class(work: Solver, c: Certificate) -> int:
 
 def _noise(work: Solver, settings: Settings) -> float:
     """Return the noise gain per source's; 1 where they cannot be compared, as the source has no filter."""
-    mode = work.first_mode
-    if work.scans is not None:
-        return noise_ratio(law_in(work.source, mode, work.scans[0]), law_in(settings, mode, work.scans[1]), work.factor)
-    return 1.0 if high_frequency_gain(work.law)[1] else noise_ratio(work.law, law_in(settings, mode), work.factor)
+    old, new = work.scans or (None, None)
+    before = noise_gain(work.source, old) * abs(work.factor)
+    if math.isinf(before):
+        return 1.0
+    return noise_gain(settings, new) / before if before else math.inf
 
 
 def _assumed(settings: Settings) -> int:

@@ -12,6 +12,7 @@ from pidemu.algorithm import Algorithm
 from pidemu.card.base import Rule, Status
 from pidemu.certificate.linear import bands, certify, compare_paths, deviation
 from pidemu.certificate.models import Certificate, Kick, ScanCost
+from pidemu.certificate.noise import MORE, noise_gain
 from pidemu.certificate.scan_cost import scan_cost
 from pidemu.conversion import match as closed
 from pidemu.conversion.aim import Aim, Match
@@ -21,7 +22,6 @@ from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.modes import Mode, Modes, law_in, looked_at
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
 from pidemu.conversion.nearest import USELESS, nearest
-from pidemu.conversion.noise import noise_is_alike
 from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import ScanError, SettingError
 from pidemu.settings import Settings
@@ -155,7 +155,8 @@ class Solver:
             return None
         least = _NEAR if filter_status(self.source) is not Status.ASSUMED else _NEAR_ENOUGH
         near = self.continuous_deviation(own) < least
-        return own if near and noise_is_alike(self.law, law_in(own, self.first_mode), self.factor) else None
+        alike = noise_gain(own) <= MORE * (1 + _CLEARLY) * noise_gain(self.source) * abs(self.factor)
+        return own if near and alike else None
 
     def certify(self, settings: Settings) -> Certificate:
         """Return the linear figures of settings of the target."""
