@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 _POINTS: Final = 300
+_ROUNDING: Final = 1e-14
+"""Part of a response's largest value that is rounding."""
 
 
 def time_scale(law: Law) -> float:
@@ -56,14 +58,22 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
 
 
 def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
-    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign."""
+    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign.
+
+    A response below 1e-14 of its largest is nothing but rounding, and counts as zero: a trapezoidal integral has no response at half
+    the scan rate, I-PD without integral none to the setpoint. Where both are zero there is no difference. Where only one is, gain and
+    phase have none that is finite; where that one is the source, nor has the deviation.
+    """
+    nothing, gone = (np.abs(x) <= _ROUNDING * np.max(np.abs(x)) for x in (source, target))
+    either = nothing | gone
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = target / source
-        ratio[(source == 0) & (target == 0)] = 1.0
-        deviation = np.abs(ratio - 1)
+        ratio = np.where(either, 1.0, target / np.where(either, 1.0, source))
+        deviation = np.where(gone, 1.0, np.abs(ratio - 1))
         gain = np.abs(20 * np.log10(np.abs(ratio)))
         phase = np.abs(np.degrees(np.angle(ratio)))
-    return np.where(np.isnan(deviation), np.inf, deviation), np.where(np.isnan(gain), np.inf, gain), np.nan_to_num(phase)
+    found = np.where(nothing, np.inf, deviation), np.where(either, np.inf, gain), np.where(either, np.inf, phase)
+    first, second, third = (np.where(nothing & gone, 0.0, np.where(np.isnan(x), np.inf, x)) for x in found)
+    return first, second, third
 
 
 def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Response], low: float, high: float) -> Band:

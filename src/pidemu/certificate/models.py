@@ -26,9 +26,9 @@ class Band:
     low, high : float
         Ends of the band [rad/s].
     max_deviation : float
-        ``max |Ct/Cs - 1|``.
+        ``max |Ct/Cs - 1|``; infinite where the source has no response and the target has one, so that the two cannot be compared.
     gain_db, phase_deg : float
-        Largest difference of gain [dB] and phase [deg], whatever its sign.
+        Largest difference of gain [dB] and phase [deg], whatever its sign; infinite where one of the two has no response.
     worst_at : float
         Frequency of the largest deviation [rad/s].
     """
