@@ -14,7 +14,6 @@ from pidemu.record.files import Record
 from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for, limits_for
 from pidemu.record.standard import REST
-from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 _ERROR: Final = 40.0
@@ -91,8 +90,8 @@ class LimitShift:
         if not self.permanent:
             return ""
         story = (
-            f"When PV moves by {self.error:.3g} %, so that the output stands at {self.limit:g} %, and comes back, the output of the "
-            f"old controller goes from {self.start:.4g} to {self.source:.4g} %, that of the new one to {self.target:.4g} %."
+            f"When PV moves by {self.error:.3g} %, so that the output stands at {self.limit:g} %, and comes back, the output of "
+            f"the old controller goes from {self.start:.4g} to {self.source:.4g} %, that of the new one to {self.target:.4g} %."
         )
         if self.source_forgets and not self.target_forgets:
             return f"{story} Without integral action the old controller was shifted after every limit; the new one keeps its bias."
@@ -109,7 +108,7 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     scans : tuple of float
         Scan intervals of both [s].
     factor : float
-        What the source's gain is multiplied by for new signal ranges; negative where the action changes.
+        What the source's gain is multiplied by for new signal ranges; its sign does not matter.
 
     Returns
     -------
@@ -136,24 +135,20 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     move = min(_MOVE * (high - low) / 100, _ERROR * gain)
     error = move / gain if gain else _ERROR
     start = high - _ROOM * move
-    actions: tuple[Action, Action] = ("direct", "direct" if factor > 0 else "reverse")
-    ends = [
-        _after(side, action, e, start, (low, high))
-        for side, action, e in zip(both, actions, (error, error / abs(factor)), strict=True)
-    ]
+    ends = [_after(side, e, start, (low, high)) for side, e in zip(both, (error, error / abs(factor)), strict=True)]
     return LimitShift(error, start, high, ends[0], ends[1], both[0].integrates, both[1].integrates)
 
 
-def _after(side: Side, action: Action, error: float, start: float, limits: tuple[float, float]) -> float:
-    """Return the output after the measurement has gone up by `error` and come back [% of the output span]."""
+def _after(side: Side, error: float, start: float, limits: tuple[float, float]) -> float:
+    """Return the output [% of its span] after the measurement has moved by `error`, such that the output rises, and come back."""
     a = side.own
     times = (abs(a.kd / a.kp) if a.kp else 0.0) + a.Tf + sum(f.at(side.scan) for f in (a.pv_filter, a.e_filter) if f is not None)
     n = int(min(max(_SLOW * times / side.scan, _SCANS), _MOST_SCANS))
     x = np.arange(5 * n + 1) / n
-    pv = REST + error * np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 0.0])
+    pv = REST - side.sign * error * np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 0.0])
     scale = Scale(side.settings)
     own = scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
-    controller, _ = controller_for(side.settings, Timing(side.scan), action, limits, start)
+    controller, _ = controller_for(side.settings, Timing(side.scan), "reverse", limits, start)
     controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(start))
     return round(float(scale.output_percent(controller.run(own.sp, own.pv))[-1]), 6) + 0.0
 

@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 _POINTS: Final = 300
 _ROUNDING: Final = 1e-14
 """Part of a response's largest value that is rounding."""
+_NO_TIME: Final = 1e-9
+"""Part of the other times that a derivative time of rounding is at most."""
 
 
 def time_scale(law: Law) -> float:
@@ -29,10 +31,19 @@ def time_scale(law: Law) -> float:
     Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the
     integral gain, and for proportional action alone, which has no time scale, one second.
     """
-    m0, m1, m2 = law.moments()
+    m0, m1, _ = law.moments()
     if m0:
         return abs(m1 / m0) if m1 / m0 > 0 else 1 / abs(m0)
-    return abs(m2 / m1) if m1 and m2 else 1.0
+    return abs(_derivative_time(law, 0.0)) or 1.0
+
+
+def _derivative_time(law: Law, Ti: float) -> float:
+    """Return ``m2/m1`` [s]; 0 where that is rounding, which a filter without derivative leaves beside the other times."""
+    _, m1, m2 = law.moments()
+    den = law.feedback.den[1:] if law.feedback.den[0] == 0 else law.feedback.den
+    lag = abs(den[1] / den[0]) if len(den) > 1 else 0.0
+    Td = m2 / m1 if m1 else 0.0
+    return Td if abs(Td) > _NO_TIME * (Ti + lag) else 0.0
 
 
 def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -48,8 +59,8 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
         The process, where it is known: the loop band then ends at twice the frequency where its phase is -180 degrees.
     """
     Ti = time_scale(law)
-    _, m1, m2 = law.moments()
-    Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
+    Td = _derivative_time(law, Ti)
+    Td = Td if Td > 0 else Ti
     nyquist = math.pi / scan if scan is not None else math.inf
     low = 0.01 / Ti
     end = 5 / Ti if process is None or not math.isfinite(process.w180) else 2 * process.w180
@@ -60,9 +71,9 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
 def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
     """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign.
 
-    A response below 1e-14 of its largest is nothing but rounding, and counts as zero: a trapezoidal integral has no response at half
-    the scan rate, I-PD without integral none to the setpoint. Where both are zero there is no difference. Where only one is, gain and
-    phase have none that is finite; where that one is the source, nor has the deviation.
+    A response below 1e-14 of its largest is nothing but rounding, and counts as zero: a trapezoidal integral has none at half the
+    scan rate, P on PV none to the setpoint. Where both are zero there is no difference. Where one is, the differences of gain and
+    phase are infinite; so is the deviation where that one is the source, and 1 where it is the target.
     """
     nothing, gone = (np.abs(x) <= _ROUNDING * np.max(np.abs(x)) for x in (source, target))
     either = nothing | gone

@@ -149,10 +149,10 @@ class NonlinearDifference:
 
     Attributes
     ----------
-    aspect : {"windup", "transfer", "limits", "arithmetic", "error", "output", "setpoint"}
+    aspect : {"windup", "transfer", "bias", "limits", "arithmetic", "error", "output", "setpoint"}
         What it is about.
     text : str
-        The difference in one sentence, with its numbers.
+        The difference in a sentence or two, with its numbers.
     figures : dict of str to tuple of float
         The numbers by name, with the unit in brackets, of source and target; infinite where something never happens.
     """
@@ -160,6 +160,11 @@ class NonlinearDifference:
     aspect: str
     text: str
     figures: Mapping[str, tuple[float, float]]
+
+    @property
+    def inside_limits(self) -> bool:
+        """Whether it shows in automatic with the output inside its limits; the others show at limits and transfers only."""
+        return self.aspect in ("arithmetic", "error", "output", "setpoint")
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,8 @@ def nonlinear_differences(
 
     What happens at a limit and at transfers, and which errors the arithmetic loses, is found by emulation, with parts of the
     standard record, each controller at its own scan interval and with the source's output limits, 0 to 100 % where it has none.
-    Two that are described by different words and behave alike have no difference. Where one cannot be emulated the text says why, and
-    the figures are missing.
+    Two that are described by different words and behave alike have no difference. Where one cannot be emulated the text says why,
+    and the figures are missing.
 
     Parameters
     ----------
@@ -125,7 +125,9 @@ def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[Nonlinea
     ways = [f"{STARTS[side.own.start]}; in manual it {_MANUAL[side.own.manual_output]}" for side in both]
     if ways[0] != ways[1]:
         each = ". ".join(f"{side.name} {w}" for side, w in zip(both, ways, strict=True))
-        yield NonlinearDifference("transfer", f"How far the output jumps at transfers is not known ({reason}). By their cards: {each}.", {})
+        yield NonlinearDifference(
+            "transfer", f"How far the output jumps at transfers is not known ({reason}). By their cards: {each}.", {}
+        )
 
 
 def _each(both: tuple[Side, Side], words: list[str]) -> str:
@@ -146,7 +148,7 @@ def _bias(source: Side, target: Side) -> Iterator[NonlinearDifference]:
     dial = target.settings.by_role(Role.BIAS)
     where = "" if dial is None else f" and enter it as {dial.name}"
     text = (
-        f"Open: the bias. Without integral action the output at SP = PV is a bias, and the settings of {source.name} do not hold it; "
-        f"read the output of the old controller while SP = PV{where}, or give it with --bias."
+        f"Open: the bias. Without integral action the output at SP = PV is a bias, and the settings of {source.name} do not hold "
+        f"it; read the output of the old controller while SP = PV{where}, or give it with --bias."
     )
     yield NonlinearDifference("bias", text, {})

@@ -81,7 +81,7 @@ def recoveries(benches: tuple[Bench, Bench], plan: Plan, scans: tuple[float, flo
     """Return how both come back from a limit.
 
     Each is at rest first; then the measurement alone makes the error. Both are run without limits as well: what their linear laws
-    make different is no difference at a limit. The output starts in the middle, or nearer to the limit where it would not get there.
+    make different is no difference at a limit. The output starts in the middle, or nearer to the limit if need be.
 
     Parameters
     ----------

@@ -119,6 +119,11 @@ class Bench:
         self._scale = Scale(side.settings)
         self._record = _record(side.scan, plan.time, plan.size)
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What makes two of them the same."""
+        return self._side.settings.card.id, self._side.settings, self._side.scan, self._plan, self._action, self._span
+
     def course(self, part: tuple[str, str], start: float, *, limited: bool) -> Course:
         """Return what the controller does with the error of some parts of the record, made by the measurement alone.
 
@@ -136,10 +141,12 @@ class Bench:
         ScanError
             The output overflows.
         """
-        first, last = (self._begins(name) for name in part)
-        error = self._record.sp - self._record.pv
-        largest = self._plan.error / np.max(np.abs(error)) if part == STEPS else 1.0
-        pv = REST - self._span * largest * error[first:last]
+        first = self._begins(part[0])
+        last = self._begins(part[1]) if part[1] else self._record.sp.size
+        error = (self._record.sp - self._record.pv)[first:last]
+        if part == STEPS:
+            error = error * (self._plan.error / np.max(np.abs(error)))
+        pv = REST - self._span * error
         own = self._scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
         controller = self._at_rest(start, self._plan.limits if limited else WIDE)
         outputs = self._scale.output_percent(controller.run(own.sp, own.pv))
@@ -172,7 +179,7 @@ class Bench:
         controller.run(own.sp[:3], own.pv[:3])
         start, end = self._begins("manual"), self._begins("return to automatic")
         last = controller.output
-        by_hand = np.concatenate(([last], own.manual[start + 1 : end]))
+        by_hand: Floats = np.concatenate((np.array([last]), own.manual[start + 1 : end]))
         moved = controller.run(own.sp[start:end], own.pv[start:end], False, by_hand)
         after = controller.run(own.sp[end : end + 1], own.pv[end : end + 1])
         bumps = (float(moved[0]) - last) * self._side.op_percent, (float(after[0]) - float(moved[-1])) * self._side.op_percent
@@ -196,9 +203,9 @@ class Bench:
         controller.rest(rest, rest, self._scale.output_own(start))
         return controller
 
-    def _begins(self, name: str) -> int | None:
+    def _begins(self, name: str) -> int:
         """Return the first sample of a segment."""
-        return int(np.searchsorted(self._since(name), -1e-6 * self._side.scan)) if name else None
+        return int(np.searchsorted(self._since(name), -1e-6 * self._side.scan))
 
     def _since(self, name: str) -> Floats:
         """Return the times of the record since a segment began [s]."""

@@ -15,6 +15,8 @@ from pidemu.certificate.trials import Bench, Plan
 
 _TRACKING: Final = 0.01
 """Relative difference of tracking times that counts."""
+_MORE: Final = 2.0
+"""With noise the outputs are so many times further apart than without, where that is worth another sentence."""
 
 
 def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], plan: Plan) -> Iterator[NonlinearDifference]:
@@ -50,15 +52,14 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     }
     if found.noisy is not None:
         figures["output on the way back from a limit, with noise [% of output span]"] = found.noisy
-    yield NonlinearDifference("windup", _story(found, plan, target.integrates), figures)
+    yield NonlinearDifference("windup", _story(found, plan, both), figures)
 
 
 def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
     """Yield what a limit leaves behind for good."""
     source, target = both
     gains = [abs(side.settings.law().moments()[1]) for side in both]
-    factor = (gains[1] / gains[0] if all(gains) else 1.0) * source.sign * target.sign
-    shift = limit_shift(source.settings, target.settings, scans, factor)
+    shift = limit_shift(source.settings, target.settings, scans, gains[1] / gains[0] if all(gains) else 1.0)
     if shift.permanent:
         figures = {"output after an excursion to the limit and back [% of output span]": (shift.source, shift.target)}
         yield NonlinearDifference("windup", shift.text, figures)
@@ -92,9 +93,12 @@ def _scheme(side: Side) -> str:
     return dict(limit_rows(side.settings.equation))["at a limit"]
 
 
-def _story(found: Recoveries, plan: Plan, integrates: bool) -> str:
+def _story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
     old, new = found.both
-    limit = f"{plan.limits[1]:g} %"
+    known = not (
+        both[0].engineering and both[0].settings.op_range is None
+    )  # else its limits are in units of which nothing is known
+    low, high = (f"{x:g} %" for x in plan.limits) if known else ("its low limit", "its high limit")
     parts = []
     if found.short:
         parts.append(
@@ -103,25 +107,23 @@ def _story(found: Recoveries, plan: Plan, integrates: bool) -> str:
         )
     elif found.late:
         parts.append(
-            f"With the valve at {limit} and the error reversing, the old controller {_leaves(old, plan)}, the new one "
+            f"With the valve at {high} and the error reversing, the old controller {_leaves(old, plan)}, the new one "
             f"{_leaves(new, plan).removeprefix('leaves the limit ')}."
         )
     if found.apart:
-        first = (
-            "With"
-            if parts
-            else f"With the valve at {limit} and the error reversing, both controllers {_both_leave(old, plan)}, but with"
+        start = (
+            "After" if parts else f"With the valve at {high} and the error reversing, both controllers {_both(old, plan)}; after"
         )
-        then = "; the loop then removes the difference" if integrates else ""
+        then = ", until the loop removes the difference" if both[1].integrates else ""
         parts.append(
-            f"{first} the error back at zero {3 * plan.time:.4g} s later, the output is {output_number(old.at_zero)} % on the old "
-            f"controller and {output_number(new.at_zero)} % on the new one{then}."
+            f"{start} {3 * plan.time:.4g} s of error the other way and back at zero, the output is "
+            f"{_on_each((old.at_zero, new.at_zero))}{then}."
         )
-    if not parts and found.noisy is not None:
+    if found.noisy is not None and (not parts or _apart(found.noisy) > _MORE * _apart((old.at_zero, new.at_zero))):
+        alike = "" if parts else "; on steps without noise they are alike"
         parts.append(
-            f"On the way back from {plan.limits[0]:g} %, along a ramp of PV with noise of {plan.size / 8:.2g} %, the output is "
-            f"{output_number(found.noisy[0])} % on the old controller and {output_number(found.noisy[1])} % on the new one, "
-            f"{found.noisy_at:.4g} s after PV has begun to come back; on steps without noise they are alike."
+            f"Coming back from {low} along a ramp of PV with noise of {plan.size / 8:.2g} %, {found.noisy_at:.4g} s after PV has "
+            f"turned, the output is {_on_each(found.noisy)}{alike}."
         )
     return " ".join(parts)
 
@@ -131,13 +133,19 @@ def output_number(x: float) -> str:
     return f"{round(x, 6) + 0.0:.4g}"
 
 
+def _apart(outputs: tuple[float, float]) -> float:
+    return abs(outputs[0] - outputs[1])
+
+
+def _on_each(outputs: tuple[float, float]) -> str:
+    return f"{output_number(outputs[0])} % on the old controller and {output_number(outputs[1])} % on the new one"
+
+
 def _leaves(r: Recovery, plan: Plan) -> str:
     if math.isinf(r.stays):
         return f"stays there for the {3 * plan.time:.4g} s that this lasts"
     return f"leaves the limit after {r.stays:.4g} s" if r.stays else "leaves the limit at once"
 
 
-def _both_leave(r: Recovery, plan: Plan) -> str:
-    if not r.at_limit:
-        return f"come back from {output_number(r.reached)} %"
+def _both(r: Recovery, plan: Plan) -> str:
     return _leaves(r, plan).replace("leaves", "leave", 1).replace("stays", "stay", 1)

@@ -104,9 +104,9 @@ def standard_record(scan: float, seed: int = 1, time: float = _DEFAULT_TIME, siz
     back from it, with noise  3     it falls back to the setpoint along a straight line in one `time`, and stays; the same noise
     ========================  ====  =============================================================================================
 
-    Up and down are alike, so that the integral ends each of the first parts about where it began. The last two parts are at the end,
-    where the derivative and noise meet an output limit: schemes that agree on steps without noise may differ there. The signals are
-    functions of time: another scan interval samples the same ones. The noise is that of the seed, on every machine.
+    Up and down are alike, so that the integral ends each of the first parts about where it began. In the last two parts derivative
+    and noise meet an output limit: schemes that agree on steps without noise may differ there. The signals are functions of time:
+    another scan interval samples the same ones. The noise is that of the seed, on every machine.
 
     Parameters
     ----------
