@@ -12,9 +12,12 @@ import pytest
 
 import pidemu
 from pidemu.card.stages import STARTS
+from pidemu.certificate import windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
-from pidemu.certificate.trials import Bench
+from pidemu.certificate.recovery import Recoveries, Recovery
+from pidemu.certificate.sides import sides
+from pidemu.certificate.trials import Bench, Plan
 from pidemu.record.sampling import limits_for
 from pidemu.record.standard import scale_of, standard_record
 from pidemu.settings import Settings
@@ -41,13 +44,23 @@ def differences(
     return {d.aspect: d for d in nonlinear_differences(source, target, scans, (time, size))}
 
 
-def excursion(s: Settings, time: float, size: float, h: float, limits: tuple[float, float] = (0, 100)) -> tuple[Floats, int, int]:
+def excursion(
+    s: Settings, time: float, size: float, h: float, limits: tuple[float, float] = (0, 100), ramp: float = 0.0
+) -> tuple[Floats, int, int]:
     """Output from rest at 50 through an error of 8 sizes, as much the other way, and none; where it turns, and where it ends."""
     n = round(time / h)
     e = 8 * size * np.concatenate([np.ones(2 * n), -np.ones(3 * n), np.zeros(n)])
+    if ramp:
+        x = np.arange(6 * n) * h
+        e = 8 * size * np.interp(x, [0, ramp, 2 * time, 2 * time + ramp, 5 * time, 5 * time + ramp], [0, 1, 1, -1, -1, 0])
     controller = pidemu.Controller(s, h, output_limits=limits)
     controller.rest(50.0, 50.0, 50.0)
     return controller.run(np.full_like(e, 50.0), 50 - e), 2 * n, 5 * n
+
+
+def slow(both: tuple[Settings, Settings], time: float) -> float:
+    """Five times the longer derivative time, half the characteristic time at most."""
+    return min(5 * max(abs(a.kd / a.kp) for a in (s.algorithm() for s in both)), time / 2)
 
 
 @pytest.mark.parametrize(("h", "stays"), [(1.0, 13.0), (0.5, 13.0), (3.0, 12.0), (0.04, 13.12)])
@@ -116,7 +129,12 @@ def test_noise_and_derivative_at_a_limit_show_what_steps_do_not() -> None:
     worst = 180 + int(np.argmax(np.abs(outputs[0] - outputs[1])[180:]))
     assert found.figures[WITH_NOISE] == pytest.approx((outputs[0][worst], outputs[1][worst]), abs=1e-9)
     assert outputs[1][worst] - outputs[0][worst] > 30
-    assert f"{worst - 180} s after PV has turned, the output is {outputs[0][worst]:.4g} % on the old controller" in found.text
+    pair = Recovery(100, True, 0.0, 50.0), Recovery(100, True, 0.0, 50.0)
+    alike = Recoveries(pair, short=False, late=False, apart=False, noisy=(1.25, 40.5), noisy_at=57.0)
+    assert windup.story(alike, Plan(60.0, 4.0, (0.0, 100.0)), sides(source, target, (1.0, 1.0))) == (
+        "Coming back from 0 % along a ramp of PV with noise of 0.5 %, 57 s after PV has turned, the output is 1.25 % on the old "
+        "controller and 40.5 % on the new one; without noise they are alike."
+    )
 
 
 def test_what_the_linear_laws_make_different_is_no_difference_at_a_limit() -> None:
@@ -140,9 +158,10 @@ def test_times_and_outputs_are_those_of_an_emulation(source: str, target: str) -
     found = differences(*pair, time=90.0)["windup"]
     for s, stays, at_zero in zip(pair, found.figures[STAYS], found.figures[AT_ZERO], strict=True):
         low, high = limits_for(pair[0], None, (0.0, 100.0))
-        output, turn, end = excursion(s, 90.0, 4.0, 1.0, (low, high))
+        ramp = slow(pair, 90.0)
+        output, turn, end = excursion(s, 90.0, 4.0, 1.0, (low, high), ramp)
         reached = output[turn - 1]
-        held = np.flatnonzero(output[turn:end] == reached)
+        held = np.flatnonzero(output[turn + math.ceil(ramp / 2) : end] == reached)
         assert stays == (held[-1] + 1 if held.size and reached in (low, high) else 0)
         assert at_zero == pytest.approx(output[-1], abs=1e-9)
 
@@ -282,9 +301,11 @@ def test_scan_intervals_too_far_apart_are_not_tried() -> None:
 
 
 def test_an_output_that_overflows_is_no_figure() -> None:
-    source = settings("astrom-hagglund/listing", K=5.7, Ti=2180, Td=576, Tt=1.5, N=3.8)
+    source = settings("astrom-hagglund/listing", K=5.7, Ti=2180, Td=0, Tt=0.0015, N=3.8)
     found = differences(source, settings("generic/standard", K=5.7, Ti=2180), 60.0, *scale_of(source, 60.0))["windup"]
-    assert "overflows at a scan interval of 60 s: the tracking time of 1.5 s is less, and back-calculation overshoots" in found.text
+    assert (
+        "overflows at a scan interval of 60 s: the tracking time of 0.0015 s is less, and back-calculation overshoots" in found.text
+    )
     assert found.figures == {}
 
 

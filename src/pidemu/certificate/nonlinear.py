@@ -64,7 +64,7 @@ def nonlinear_differences(
     (0.0, -4.04)
     """
     both = sides(source, target, scans)
-    trial = planned(source, scans, time_and_size, limits_for(source, None, (0.0, 100.0)))
+    trial = planned(both, time_and_size, limits_for(source, None, (0.0, 100.0)))
     found = [
         *_emulated(both, trial),
         *_bias(*both),

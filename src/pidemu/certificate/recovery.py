@@ -133,15 +133,20 @@ def _at(course: Course, time: float) -> float:
 def _recovery(course: Course, plan: Plan) -> Recovery:
     times, outputs = course
     step, (low, high) = float(times[1] - times[0]), plan.limits
-    turn, back = (int(np.searchsorted(times, t * plan.time - _HAIR * step)) for t in (2.0, 5.0))
+    turn, zero, back = (np.searchsorted(times, t - _HAIR * step) for t in (2 * plan.time, _turned(plan), 5 * plan.time))
     reached, rounding = float(outputs[turn - 1]), 1e-6 * (high - low)  # limits in float32
     at_high = reached >= high - rounding
     if not at_high and reached > low + rounding:
         return Recovery(reached, False, 0.0, float(outputs[-1]))
-    held = outputs[turn:back]
+    held = outputs[zero:back]
     still = np.flatnonzero(held >= high - rounding if at_high else held <= low + rounding)
     off = int(still[-1]) + 1 if still.size else 0
     return Recovery(reached, True, math.inf if off >= held.size else off * step, float(outputs[-1]))
+
+
+def _turned(plan: Plan) -> float:
+    """Return when the error has the other sign [s]."""
+    return 2 * plan.time + plan.ramp / 2
 
 
 def _noisy(benches: tuple[Bench, Bench], plan: Plan, low: float) -> tuple[tuple[float, float] | None, float]:

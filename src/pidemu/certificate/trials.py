@@ -18,12 +18,13 @@ from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for
 from pidemu.record.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
 from pidemu.scan.build import Action
-from pidemu.settings import Settings
 
 _MOST_SCANS: Final = 2000
 """The characteristic time is at most this many scans: it is a figure that is wanted, not a plot."""
 _TOO_MANY: Final = 10_000
 """With more it is not tried: the other's interval is so much longer that the two have no time in common."""
+_SLOW: Final = 5.0
+"""A large error changes in so many derivative times, so that the derivative adds 40 % to what P does when it reverses."""
 _FARTHEST: Final = 45.0
 """The largest error [% of the measurement span]: the measurement alone makes it, from 50 %."""
 STEPS: Final = ("large positive error", "manual")
@@ -44,11 +45,14 @@ class Plan:
         Characteristic time [s] and size [% of the source's measurement span] of the standard record.
     limits : tuple of float
         Output limits of both [% of the output span].
+    ramp : float
+        How long the large error takes to change [s]: no measurement in a plant steps by as much, and a derivative would kick.
     """
 
     time: float
     size: float
     limits: tuple[float, float]
+    ramp: float = 0.0
 
     @property
     def error(self) -> float:
@@ -66,28 +70,28 @@ class Plan:
         return sum(self.limits) / 2
 
 
-def planned(source: Settings, scans: tuple[float, float], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
+def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
     """Return what to try: with this time and size, or with another time where that takes too many scans, or too few.
 
     Parameters
     ----------
-    source : Settings
-        The source, which sets the size that goes with another time.
-    scans : tuple of float
-        Scan intervals of source and target [s].
+    both : tuple of Side
+        Source and target; the source sets the size that goes with another time.
     time_and_size : tuple of float
         Characteristic time [s] and size [%].
     limits : tuple of float
         Output limits [%].
     """
     time, size = time_and_size
+    source, scans = both[0].settings, (both[0].scan, both[1].scan)
     shortest = LEAST_SCANS * max(scans)
     longest = max(_MOST_SCANS * min(scans), shortest)
     if time > longest:
         time, size = scale_of(source, longest / MOST_SCANS)  # of which this is the longest time
     elif time < shortest:
         time, size = scale_of(source, max(scans))
-    return Plan(time, size, limits)
+    derivative = max(abs(side.own.kd / side.own.kp) if side.own.kp else abs(side.own.kd) * time for side in both)
+    return Plan(time, size, limits, min(_SLOW * derivative, time / 2))
 
 
 class Bench:
@@ -143,16 +147,17 @@ class Bench:
         """
         first = self._begins(part[0])
         last = self._begins(part[1]) if part[1] else self._record.sp.size
+        times = self._since(part[0])[first:last]
         error = (self._record.sp - self._record.pv)[first:last]
         if part == STEPS:
-            error = error * (self._plan.error / np.max(np.abs(error)))
+            error = self._plan.error * self._softened(times, error / np.max(np.abs(error)))
         pv = REST - self._span * error
         own = self._scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
         controller = self._at_rest(start, self._plan.limits if limited else WIDE)
         outputs = self._scale.output_percent(controller.run(own.sp, own.pv))
         if not np.isfinite(outputs).all():
             raise self._overflow()
-        return self._since(part[0])[first:last], outputs
+        return times, outputs
 
     def transfers(self) -> tuple[float, float]:
         """Return the bumps at the transfers to manual and back [% of the output span].
@@ -196,6 +201,15 @@ class Bench:
             It cannot, or its output overflows.
         """
         self.course(STEPS, self._plan.middle, limited=True)
+
+    def _softened(self, times: Floats, error: Floats) -> Floats:
+        """Return the steps of an error of size 1, each taking the time of the plan."""
+        time, ramp = self._plan.time, self._plan.ramp
+        if not ramp:
+            return error
+        edges = [0.0, ramp, 2 * time, 2 * time + ramp, 5 * time, 5 * time + ramp]
+        softened: Floats = np.interp(times, edges, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+        return softened
 
     def _at_rest(self, start: float, limits: tuple[float, float]) -> Controller:
         controller, _ = controller_for(self._side.settings, Timing(self._side.scan), self._action, limits, start)

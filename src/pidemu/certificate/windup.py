@@ -52,7 +52,7 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     }
     if found.noisy is not None:
         figures["output on the way back from a limit, with noise [% of output span]"] = found.noisy
-    yield NonlinearDifference("windup", _story(found, plan, both), figures)
+    yield NonlinearDifference("windup", story(found, plan, both), figures)
 
 
 def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
@@ -93,7 +93,18 @@ def _scheme(side: Side) -> str:
     return dict(limit_rows(side.settings.equation))["at a limit"]
 
 
-def _story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
+def story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
+    """Return the differences as sentences with times.
+
+    Parameters
+    ----------
+    found : Recoveries
+        What both did.
+    plan : Plan
+        What was tried.
+    both : tuple of Side
+        Source and target.
+    """
     old, new = found.both
     known = not (
         both[0].engineering and both[0].settings.op_range is None
@@ -120,7 +131,7 @@ def _story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
             f"{_on_each((old.at_zero, new.at_zero))}{then}."
         )
     if found.noisy is not None and (not parts or _apart(found.noisy) > _MORE * _apart((old.at_zero, new.at_zero))):
-        alike = "" if parts else "; on steps without noise they are alike"
+        alike = "" if parts else "; without noise they are alike"
         parts.append(
             f"Coming back from {low} along a ramp of PV with noise of {plan.size / 8:.2g} %, {found.noisy_at:.4g} s after PV has "
             f"turned, the output is {_on_each(found.noisy)}{alike}."
