@@ -15,11 +15,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.certificate.figures import decibels, degrees, percent
+from pidemu.certificate.linear import certify, differences, time_scale
 from pidemu.certificate.models import Kick, PathComparison
 from pidemu.cli import cli
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 from tests.conversion.support import Floats, continuous, difference, settings_that_act
+from tests.helpers import made_up_card
 
 PROVOX = {"GAIN": 2, "RESET": 4, "RATE": 0.1}
 TERM_FILTERS = (
@@ -396,3 +399,39 @@ def test_what_is_assumed_is_listed() -> None:
     conversion = convert("fisher/provox", PROVOX, "emerson/deltav")
     assert any("fisher/provox: derivative.filter.ratio = 0.125" in a for a in conversion.assumptions)
     assert convert("generic/standard", {"K": 2, "Ti": 60}, "generic/parallel").assumptions == ()
+
+
+class TestNoResponse:
+    """Where one path has no response there is nothing to compare, and no figure of 1e16 stands for it."""
+
+    def test_a_filter_without_derivative_does_not_move_the_end_of_the_full_band(self) -> None:
+        """K Tf/Ti (1 - 1) leaves m2 = 6e-14: no derivative time, at 100 times whose reciprocal the two would differ 1e16 times."""
+        source = pidemu.load_card("generic/standard").settings(K=17, Ti=15, Tf=21, b=0)
+        assert source.law().moments()[2] != 0
+        c = pidemu.convert(source, "generic/standard", match="textbook", emulate=False).certificate
+        assert c.setpoint.full_band.high == pytest.approx(100 / 15)
+        assert c.setpoint.full_band.max_deviation == pytest.approx(100, rel=1e-9)  # K (1 + 1/(s Ti)) per K/(s Ti), less 1: s Ti
+        assert time_scale(source.law()) == pytest.approx(15)
+
+    def test_a_setpoint_path_that_is_zero_is_not_comparable(self) -> None:
+        card = pidemu.load_card("generic/standard")
+        on_pv, on_error = card.settings(K=2, Ti="off", b=0), card.settings(K=2, Ti="off")
+        band = certify(on_pv.law(), on_error.law(), None).setpoint.loop_band
+        assert (band.max_deviation, band.gain_db, band.phase_deg) == (math.inf, math.inf, math.inf)
+        assert [percent(band.max_deviation), decibels(band), degrees(band)] == ["not comparable", "-", "-"]
+        lost = certify(on_error.law(), on_pv.law(), None).setpoint.loop_band
+        assert [percent(lost.max_deviation), decibels(lost), degrees(lost)] == ["100 %", "-", "-"]
+        none = certify(on_pv.law(), on_pv.law(), None).setpoint.loop_band
+        assert (none.max_deviation, none.gain_db, none.phase_deg) == (0, 0, 0)
+        plain = certify(on_pv.law(), on_error.law(), None).to_dict()
+        assert plain["setpoint"]["loop_band"]["max_deviation"] == "inf"
+
+    def test_a_response_that_is_only_rounding_is_none(self) -> None:
+        """A trapezoidal integral has no response at half the scan rate: there 1 + z^-1 is rounding."""
+        text = {"rule": "trapezoidal", "windup": {"scheme": "none"}}
+        source = made_up_card(integral=text).settings(kp=0, ki=0.1, kd=0)
+        target = pidemu.load_card("generic/parallel").settings(kp=0, ki=0.1)
+        w = np.array([0.1, math.pi])
+        deviation, gain, _ = differences(source.law(1.0).held(w), target.law(1.0).held(w))
+        assert deviation[0] < 0.1
+        assert (deviation[1], gain[1]) == (math.inf, math.inf)

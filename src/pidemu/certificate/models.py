@@ -26,9 +26,9 @@ class Band:
     low, high : float
         Ends of the band [rad/s].
     max_deviation : float
-        ``max |Ct/Cs - 1|``.
+        ``max |Ct/Cs - 1|``; infinite where the source has no response and the target has one, so that the two cannot be compared.
     gain_db, phase_deg : float
-        Largest difference of gain [dB] and phase [deg], whatever its sign.
+        Largest difference of gain [dB] and phase [deg], whatever its sign; infinite where one of the two has no response.
     worst_at : float
         Frequency of the largest deviation [rad/s].
     """
@@ -155,10 +155,10 @@ class NonlinearDifference:
 
     Attributes
     ----------
-    aspect : {"windup", "transfer", "limits", "arithmetic", "error", "output", "setpoint"}
+    aspect : {"windup", "transfer", "bias", "limits", "arithmetic", "error", "output", "setpoint"}
         What it is about.
     text : str
-        The difference in one sentence, with its numbers.
+        The difference in a sentence or two, with its numbers.
     figures : dict of str to tuple of float
         The numbers by name, with the unit in brackets, of source and target; infinite where something never happens.
     """
@@ -166,6 +166,11 @@ class NonlinearDifference:
     aspect: str
     text: str
     figures: Mapping[str, tuple[float, float]]
+
+    @property
+    def inside_limits(self) -> bool:
+        """Whether it shows in automatic with the output inside its limits; the others show at limits and transfers only."""
+        return self.aspect in ("arithmetic", "error", "output", "setpoint")
 
 
 @dataclass(frozen=True, slots=True)
