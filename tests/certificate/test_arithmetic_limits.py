@@ -111,7 +111,7 @@ def test_with_the_output_range_known_limits_in_engineering_units_are_percent() -
     found = differences(source, settings("simple-pid/simple-pid", Kp=2, Ki=0.02, pv_range=(0, 100), op_range=(4, 20)))["limits"]
     assert found.figures == {"low output limit [%]": (0, -math.inf), "high output limit [%]": (100, math.inf)}
     assert "0 to 100 % on generic/parallel and none on simple-pid/simple-pid" in found.text
-    assert "0 to 100 % is 4 to 20 in the units of simple-pid/simple-pid" in found.text
+    assert "0 to 100 % is 4 to 20 on simple-pid/simple-pid" in found.text
 
 
 def test_without_the_range_limits_stand_in_the_units_of_each() -> None:

@@ -15,6 +15,7 @@ from pidemu.certificate.sides import Side, sides
 from pidemu.certificate.stages import error_differences, limit_differences, output_differences, setpoint_differences
 from pidemu.certificate.trials import Plan, Trial, planned, tried
 from pidemu.errors import PidemuError
+from pidemu.range_relation import Relation, relation
 from pidemu.record.sampling import limits_for
 from pidemu.settings import Settings
 
@@ -94,9 +95,8 @@ class _Outcomes:
 
 def _trials(both: tuple[Side, Side], trial: Plan) -> _Outcomes:
     source, target = both
-    span = 1.0
-    if source.settings.pv_range and target.settings.pv_range:
-        span = source.settings.spans.pv / target.settings.spans.pv
+    related = relation(source.settings.pv_range, target.settings.pv_range, "pv_range")
+    span = 1 / float(related.factor) if isinstance(related, Relation) else 1.0
     done = []
     for side, share in ((source, 1.0), (target, span)):
         try:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
+from pidemu.conversion.spans import range_questions, rescaling, signals_note
 from pidemu.settings import Settings
 from pidemu.units import Role
 
@@ -38,11 +39,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
 
 
 def _ranges(c: Conversion) -> Iterator[str]:
-    if abs(c.factor) != 1:
-        yield (
-            f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
-            "engineering units"
-        )
+    yield from rescaling(c.source, c.request.to_pv_range, c.request.to_op_range).notes
     direct, reverse = (c.settings.equation.action.names[sense] for sense in ("direct", "reverse"))
     if c.factor < 0 and c.source.equation.action.fixed:
         yield (
@@ -54,12 +51,11 @@ def _ranges(c: Conversion) -> Iterator[str]:
             f"the source's gains are negative: these are positive, so set the action to '{direct}' where the source was reverse "
             f"acting, to '{reverse}' where it was direct acting"
         )
-    for s in (c.source, c.settings):
-        if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
-            yield (
-                f"{s.card.id} computes in engineering units, and not all ranges were given: spans not given are taken as 100; "
-                "give the ranges of measurement and output"
-            )
+    for question in range_questions(c.source, c.settings):
+        yield f"{question.text}; 0 to 100 is taken"
+    note = signals_note(c.source, c.settings)
+    if note:
+        yield note
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:

@@ -16,12 +16,14 @@ from pidemu.conversion.choices import Attempt, attempts
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.moments import check_optimiser
-from pidemu.conversion.request import Request, read_request
+from pidemu.conversion.request import read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
+from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.ranges import RangeGiven
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
@@ -41,8 +43,8 @@ def convert(
     scan: float | tuple[float, float] | None = None,
     match: str | None = None,
     allow_approximate: bool = False,
-    pv_range: tuple[float, float] | None = None,
-    op_range: tuple[float, float] | None = None,
+    to_pv_range: RangeGiven | None = None,
+    to_op_range: RangeGiven | None = None,
     round_dials: bool = False,
     process: Process | None = None,
     compensate: bool = True,
@@ -70,9 +72,10 @@ def convert(
         the loop band is least); by default exact where possible, else low-frequency.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
-    pv_range, op_range : tuple of float, optional
-        Signal ranges of the target [engineering units]; by default the source's. Where they differ, gains are rescaled for
-        the same effect in engineering units.
+    to_pv_range, to_op_range : tuple or str, optional
+        Ranges of the target's measurement and output with their unit, ``(0, 1000, "degF")``; by default the source's. Another
+        range of the same quantity rescales the gain for the same effect in its units; the same signal on another scale, such as
+        counts, does not (see `pidemu.ranges.relation`).
     round_dials : bool
         Round the dials to the target's resolution; the certificate states the effect.
     process : Process, optional
@@ -94,7 +97,7 @@ def convert(
     ConversionRefusedError
         The target cannot do what the source does; the error holds the nearest settings and what they would cost.
     SettingError, CardError
-        The target, the match, an option or a given dial is unknown, or a range of the source is missing.
+        The target, the match, an option or a given dial is unknown, or what two ranges have to do with each other is not clear.
     ScanError
         A scan interval is no positive number, or a filter is unstable at it.
 
@@ -110,19 +113,21 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    request = read_request(card, options, given, scan, match, pv_range, op_range)
+    request = read_request(card, options, given, scan, match, to_pv_range, to_op_range)
     request = replace(request, process=process, compensate=compensate, allow_approximate=allow_approximate, round_dials=round_dials)
-    factor = _rescaling(source, request)
+    rescaled = rescaling(source, request.to_pv_range, request.to_op_range)
+    if rescaled.questions:
+        raise SettingError("\n".join(f"{source.card.id}: {question.in_words}" for question in rescaled.questions))
     taken = {**(source.options if source.card.id == card.id else {}), **request.options}
     fixed = {**_shared(source, card), **request.given}
     if request.scan is not None:
         source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
     def solver(named: Mapping[str, object]) -> Solver:
-        goal = Target(card, named, fixed, request.pv_range or source.pv_range, request.op_range or source.op_range)
+        goal = Target(card, named, fixed, request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
         goal.reject_missing()
         sign = -1 if _is_negative(source, goal) else 1
-        return Solver(source, goal, sign * factor, request.scan, process, compensate=compensate)
+        return Solver(source, goal, sign * float(rescaled.factor), request.scan, process, compensate=compensate)
 
     ranking = attempts(card, taken, solver, aim, wanted=request.given, every=all_options)
     best, refusal, settings = ranking[0], "", ranking[0].settings
@@ -233,16 +238,3 @@ def _textbook(solver: Solver) -> Textbook:
         return Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
         return Textbook(None, None, str(error))
-
-
-def _rescaling(source: Settings, request: Request) -> float:
-    """Return the factor on the percent gain for new ranges (specs/equations.md, section 3, rescaling)."""
-    factor = 1.0
-    for name, new, old, power in (
-        ("pv_range", request.pv_range, source.pv_range, 1), ("op_range", request.op_range, source.op_range, -1),
-    ):  # fmt: skip
-        if new is not None and old is None and new != (0.0, 100.0):
-            raise SettingError(f"{source.card.id}: the target's {name} is given, the source's is not; give both")
-        if new is not None and old is not None:
-            factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
-    return factor

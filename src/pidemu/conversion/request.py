@@ -12,6 +12,7 @@ from pidemu.card.load import Card
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
+from pidemu.ranges import RANGES, SignalRange, option_of, read_range
 from pidemu.reading import signal_range
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ class Request:
         Scan intervals of source and target [s].
     match : str or None
         The match asked for.
-    pv_range, op_range : tuple of float or None
-        New signal ranges of the target.
+    to_pv_range, to_op_range : SignalRange or None
+        Ranges of the target's measurement and output.
     process : Process or None
         The process.
     compensate, allow_approximate, round_dials : bool
@@ -42,8 +43,8 @@ class Request:
     given: Mapping[str, object] = field(default_factory=dict)
     scan: tuple[float, float] | None = None
     match: str | None = None
-    pv_range: tuple[float, float] | None = None
-    op_range: tuple[float, float] | None = None
+    to_pv_range: SignalRange | None = None
+    to_op_range: SignalRange | None = None
     process: Process | None = None
     compensate: bool = True
     allow_approximate: bool = False
@@ -55,9 +56,9 @@ class Request:
             yield from ("--set", f"{name}={exactly(value) if isinstance(value, float) else value}")
         if self.scan is not None:
             yield from ("--scan", ",".join(exactly(h) for h in dict.fromkeys(self.scan)))
-        for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
-            if ends is not None:
-                yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
+        for name, given in zip(RANGES, (self.to_pv_range, self.to_op_range), strict=True):
+            if given is not None:
+                yield f"{option_of(name, target=True)}={read_range(given).argument}"
         if self.match is not None:
             yield from ("--match", self.match)
         if self.process is not None:
@@ -76,8 +77,8 @@ def read_request(
     given: Mapping[str, object] | None,
     scan: object,
     match: str | None,
-    pv_range: object,
-    op_range: object,
+    to_pv_range: object,
+    to_op_range: object,
 ) -> Request:
     """Return what is asked for, checked; see `convert` for the arguments.
 
@@ -86,7 +87,7 @@ def read_request(
     Raises
     ------
     SettingError
-        A name comes twice, or a range is none.
+        A name comes twice, or a range is not one.
     ScanError
         A scan interval is no positive number.
     """
@@ -99,7 +100,7 @@ def read_request(
     spelled = {o.casefold(): o for o in card.options}
     chosen = {spelled.get(n.casefold(), n): x for n, x in named.items() if n.casefold() in spelled or n in (options or {})}
     dials = {n: x for n, x in named.items() if n.casefold() not in spelled and n not in (options or {})}
-    pv, op = signal_range(card, "pv_range", pv_range), signal_range(card, "op_range", op_range)
+    pv, op = signal_range(card, "to_pv_range", to_pv_range), signal_range(card, "to_op_range", to_op_range)
     return Request(chosen, dials, _scans(scan), match, pv, op)
 
 

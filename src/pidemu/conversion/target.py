@@ -15,6 +15,7 @@ from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
@@ -139,8 +140,8 @@ class Target:
         Options by name.
     given : mapping
         Dials that the user has fixed.
-    pv_range, op_range : tuple of float, optional
-        Signal ranges.
+    pv_range, op_range : SignalRange, optional
+        Ranges of measurement and output.
     """
 
     def __init__(
@@ -148,8 +149,8 @@ class Target:
         card: Card,
         options: Mapping[str, object],
         given: Mapping[str, object],
-        pv_range: tuple[float, float] | None,
-        op_range: tuple[float, float] | None,
+        pv_range: SignalRange | None,
+        op_range: SignalRange | None,
     ) -> None:
         self.card = card
         self.variant: Variant = card.variant(options)

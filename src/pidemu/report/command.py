@@ -10,6 +10,7 @@ from pidemu.card.load import Card
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
+from pidemu.ranges import RANGES, option_of
 
 
 def command_for(c: Conversion) -> str:
@@ -22,9 +23,9 @@ def _words(c: Conversion) -> Iterator[str]:
     yield from ("pidemu", "convert", name_of(source.card))
     yield from (f"{n}={exactly(v.value)}" for n, v in source.items() if v.given)
     yield from (f"{n}={x}" for n, x in source.options.items() if n not in source.defaulted)
-    for name, ends in (("pv", source.pv_range), ("op", source.op_range)):
-        if ends is not None:
-            yield f"--{name}-range={exactly(ends[0])},{exactly(ends[1])}"
+    for name, given in zip(RANGES, (source.pv_range, source.op_range), strict=True):
+        if given is not None:
+            yield f"{option_of(name)}={given.argument}"
     yield from ("--to", name_of(c.settings.card), *c.request.words())
 
 
