@@ -10,6 +10,7 @@ import pytest
 import pidemu
 from pidemu.conversion.spans import range_questions, ranges_needed, signals_note
 from pidemu.errors import SettingError
+from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 from tests.cli.helpers import strict_json, told
@@ -266,3 +267,34 @@ def test_a_loop_file_takes_ranges_with_units(tmp_path: Path) -> None:
 def test_an_assignment_takes_a_range_with_its_unit() -> None:
     words = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "pv_range=0,200 degC", "--to", "emerson/deltav")
     assert converted(*words, "--to-pv-range", "0,400 degC")["to"]["settings"]["GAIN"]["value"] == 4
+
+
+@pytest.mark.parametrize("target", ["bailey/fc18", "bailey/fc19"])
+@pytest.mark.parametrize("ranges", [(100, 100), (200, 100), (100, 200), (0.3, 16)])
+def test_an_overall_multiplier_that_sets_the_filter_does_not_depend_on_the_spans(target: str, ranges: tuple[float, float]) -> None:
+    """Ki = 2/90 1/s and Kd = 20 s with a filter of 1 s: exact with K = 2 and KD = 1/6 min, in the two cards' common units."""
+    source = load("advanced-pid/advanced-pid", Kp=2, Ki=2 / 90, Kd=20, Tf=1, pv_range=(0, ranges[0]), op_range=(0, ranges[1]))
+    found = convert(source, target)
+    assert found.verdict == "exact"
+    assert dials(found, "K", "KP", "KI", "KD") == pytest.approx([2, 1, 60 / 90, 1 / 6], rel=1e-9)
+
+
+PAIRS = [
+    ("fisher/provox", "emerson/deltav"), ("fisher/provox", "epics/epid"), ("iec/61131-3-pid", "emerson/deltav"),
+    ("ros/control-toolbox", "mathworks/pid2"), ("modelica/limpid", "bailey/fc18"), ("arduino/pid", "simple-pid/simple-pid"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "target"), PAIRS)
+def test_ranges_are_needed_exactly_where_a_span_twice_as_wide_changes_a_dial(source: str, target: str) -> None:
+    plain, card = typical_settings(pidemu.load_card(source)), pidemu.load_card(target)
+
+    def found(pv: float, op: float) -> list[float]:
+        ranged = plain.changed({"pv_range": (0, pv), "op_range": (0, op)})
+        return [v.value for v in convert(ranged, target, given=held_dials(card), allow_approximate=True).settings.values()]
+
+    once, wider = found(100, 100), {"pv_range": found(200, 100), "op_range": found(100, 200)}
+    changes = tuple(
+        name for name, values in wider.items() if values != pytest.approx(once, rel=1e-6)
+    )  # as near as matches are found
+    assert ranges_needed(plain, convert(plain, target, given=held_dials(card), allow_approximate=True).settings) == changes

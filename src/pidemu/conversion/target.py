@@ -208,6 +208,11 @@ class Target:
         """Whether there is a derivative term."""
         return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
 
+    @property
+    def percent_per_unit(self) -> float:
+        """Percent gain that a gain of 1 in the card's own signals amounts to [%/%]."""
+        return float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+
     def _find_filter(self) -> TargetFilter:
         filt = self.variant.equation.derivative.filter
         if filt is None:
@@ -281,7 +286,7 @@ class Target:
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
         scale = self.multiplier if n.multiplier is None else n.multiplier
-        engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        engineering = self.percent_per_unit
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
@@ -356,7 +361,7 @@ class Target:
         """Return the derivative time that the filter's ratio or gain refers to [s], for numbers that may be arrays."""
         scale = self.multiplier if n.multiplier is None else n.multiplier
         parallel = self.form is Form.PARALLEL
-        scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        scale *= self.percent_per_unit
         time = n.kd / scale if parallel else 0.0 if _is_zero(n.K) else n.kd / n.K
         return time / (1 + time * n.ki / n.K) if self.filter.effective and not _is_zero(time) else time
 
