@@ -12,7 +12,8 @@ from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.models import Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.settings import RESERVED, Settings, Value, limits, off_values, spans_of
+from pidemu.ranges import RANGES, SignalRange, read_range
+from pidemu.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
@@ -23,7 +24,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     """Read settings and options; see `Card.settings`."""
     given = dict(given)
     _refuse_twice(card, given)
-    pv_range, op_range = (signal_range(card, name, given.pop(name, None)) for name in RESERVED)
+    pv_range, op_range = (signal_range(card, name, given.pop(name, None)) for name in RANGES)
     options = {k: v for k, v in given.items() if match_name(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
     notes: list[str] = []
@@ -92,19 +93,12 @@ def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, obje
     return chosen
 
 
-def signal_range(card: Card, name: str, given: object) -> tuple[float, float] | None:
-    """Return a signal range [engineering units]; raises `SettingError` where it is none."""
-    if given is None:
-        return None
+def signal_range(card: Card, name: str, given: object) -> SignalRange | None:
+    """Return a signal range that is given for a card, if it is; raises `SettingError` where it is not a range."""
     try:
-        if isinstance(given, str):
-            raise ValueError
-        low, high = (float(x) for x in given)  # type: ignore[attr-defined]
-    except (TypeError, ValueError, OverflowError):
-        raise SettingError(f"{card.id}: {name}: '{given}' is not a pair of numbers such as (0, 200)") from None
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise SettingError(f"{card.id}: {name}: {low:g} to {high:g} is no range; give low, then high")
-    return low, high
+        return None if given is None else read_range(given)
+    except SettingError as error:
+        raise SettingError(f"{card.id}: {name}: {error}") from None
 
 
 def _read(
@@ -172,7 +166,7 @@ def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:
     """Refuse a unit whose conversion takes the signal ranges, where these are not given."""
     needs = {Dimension.PV_UNITS: (True, False), Dimension.PERCENT_PER_PV: (True, False), Dimension.OP_PER_PV: (True, True)}
     pv, op = needs.get(written.dimension, needs.get(unit.dimension, (False, False)))
-    missing = [name for name, needed, given in zip(RESERVED, (pv, op), ranged, strict=True) if needed and not given]
+    missing = [name for name, needed, given in zip(RANGES, (pv, op), ranged, strict=True) if needed and not given]
     if missing:
         raise SettingError(
             f"{written.name} is {written.dimension.value}, for a dial in {unit.name}: {' and '.join(missing)} must be given"

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.load import Card, Statement, Variant
 from pidemu.card.models import Equation, Setting
+from pidemu.ranges import PERCENT, SignalRange
 from pidemu.units import FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
     from pidemu.law import Law
-
-RESERVED: Final = ("pv_range", "op_range")
-"""Names that no setting may have: they state the signal ranges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +114,8 @@ class Settings(Mapping[str, Value]):
         The card with its options chosen.
     values_by_name : dict
         Value by dial.
-    pv_range, op_range : tuple of float or None
-        Signal ranges [engineering units], where given.
+    pv_range, op_range : SignalRange or None
+        Ranges of measurement and output, where given.
     notes : tuple of str
         What was inferred or converted on the way in.
     defaulted : tuple of str
@@ -129,8 +127,8 @@ class Settings(Mapping[str, Value]):
 
     variant: Variant
     values_by_name: Mapping[str, Value]
-    pv_range: tuple[float, float] | None = None
-    op_range: tuple[float, float] | None = None
+    pv_range: SignalRange | None = None
+    op_range: SignalRange | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
     pace: float = 1.0
@@ -177,6 +175,13 @@ class Settings(Mapping[str, Value]):
     def spans(self) -> Spans:
         """Signal spans; 100 where no range was given."""
         return spans_of(self.pv_range, self.op_range)
+
+    @property
+    def own_ranges(self) -> tuple[SignalRange, SignalRange]:
+        """Ranges of measurement and output in the units that the card computes in: percent, or the ranges given, else 0 to 100."""
+        if self.equation.signals == "percent":
+            return PERCENT, PERCENT
+        return self.pv_range or PERCENT, self.op_range or PERCENT
 
     def by_role(self, role: Role) -> Value | None:
         """Return the active dial that sets `role`, or ``None``."""
@@ -244,11 +249,13 @@ class Settings(Mapping[str, Value]):
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return card, active settings and options as plain values, for JSON."""
+        """Return card, active settings, options and the ranges given as plain values, for JSON."""
+        ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         return {
             "card": self.card.id,
             "settings": {n: {"value": v.value, "unit": v.unit} for n, v in self.items() if v.active},
             "options": dict(self.options),
+            **{name: given.to_dict() for name, given in ranges if given is not None},
         }
 
     def without_use_for(self, signals: Iterable[str]) -> dict[str, str]:
@@ -274,6 +281,6 @@ class Settings(Mapping[str, Value]):
         return Law(self.algorithm(scan=scan), scan)
 
 
-def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
+def spans_of(pv: SignalRange | None, op: SignalRange | None) -> Spans:
     """Return the spans of signal ranges; 100 where none is given."""
-    return Spans(pv[1] - pv[0] if pv else 100.0, op[1] - op[0] if op else 100.0)
+    return Spans((pv or PERCENT).span, (op or PERCENT).span)

@@ -13,6 +13,7 @@ from pidemu.ambiguity.readings import apart, command_line
 from pidemu.card.library import card_files
 from pidemu.cli.common import assignments
 from pidemu.errors import CardNotFoundError, SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 from tests.checks.bench import VALID
 
@@ -254,7 +255,7 @@ def test_commands_for_cards_of_one_s_own_name_their_folder_or_file(own_cards: Pa
 
 def test_ranges_are_kept_and_stated() -> None:
     first, *_ = pidemu.readings("arduino/pid", Kp=2, Ki=0.1, pv_range=(-50, 150), op_range=(0, 255))
-    assert first.settings.pv_range == (-50, 150)
+    assert first.settings.pv_range == SignalRange(-50, 150)
     assert first.command == 'arduino/pid Kp=2 "Ki=0.1 1/s" --pv-range=-50,150 --op-range=0,255'
 
 

@@ -229,11 +229,14 @@ def test_the_kick_is_the_first_move_of_the_emulated_controller() -> None:
 class TestRescaling:
     """New signal ranges: the same effect in engineering units."""
 
-    RANGES: ClassVar = {"pv": ((0.0, 100.0), (50.0, 250.0)), "op": ((0.0, 80.0), (0.0, 100.0))}
+    RANGES: ClassVar = {
+        "pv": ((0.0, 100.0, "degC"), (50.0, 250.0, "degC")),
+        "op": ((0.0, 80.0, "kg/h"), (0.0, 100.0, "kg/h")),
+    }
 
     def convert(self, target: str, **options: str) -> pidemu.Conversion:
         source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=self.RANGES["pv"][0], op_range=self.RANGES["op"][0])
-        return pidemu.convert(source, target, options=options, pv_range=self.RANGES["pv"][1], op_range=self.RANGES["op"][1])
+        return pidemu.convert(source, target, options=options, to_pv_range=self.RANGES["pv"][1], to_op_range=self.RANGES["op"][1])
 
     def test_the_factor_is_that_of_the_spans(self) -> None:
         assert self.convert("emerson/deltav").factor == pytest.approx(200 / 100 * 80 / 100)
@@ -263,20 +266,23 @@ class TestRescaling:
         for s in (conversion.source, conversion.settings):
             assert s.pv_range is not None
             assert s.op_range is not None
-            zero, span = s.pv_range[0], s.pv_range[1] - s.pv_range[0]
-            start = 100 * (40 - s.op_range[0]) / (s.op_range[1] - s.op_range[0])
+            zero, span = s.pv_range.low, s.pv_range.span
+            start = 100 * (40 - s.op_range.low) / s.op_range.span
             controller = pidemu.Controller(s, 1.0, output_limits=(-1e9, 1e9), initial_output=start)
             percent = controller.run(100 * (sp - zero) / span, 100 * (pv - zero) / span)
-            valves.append(s.op_range[0] + percent / 100 * (s.op_range[1] - s.op_range[0]))
+            valves.append(s.op_range.low + percent / 100 * s.op_range.span)
         assert np.ptp(valves[0]) > 1
         assert difference(valves[0], valves[1]) < 1e-9  # 152 scans of doubles
 
     def test_a_warning_says_so(self) -> None:
-        assert any("multiplied by 1.6 for the same effect" in w for w in self.convert("generic/parallel").warnings)
+        assert self.convert("generic/parallel").warnings[:2] == (
+            "PV range: 0 to 100 degC becomes 50 to 250 degC, so the gain in percent is multiplied by 2",
+            "output range: 0 to 80 kg/h becomes 0 to 100 kg/h, so the gain in percent is multiplied by 0.8",
+        )
 
     def test_the_same_ranges_change_nothing(self) -> None:
-        source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=(0, 300))
-        conversion = pidemu.convert(source, "generic/parallel", pv_range=(100, 400))
+        source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=(0, 300, "K"))
+        conversion = pidemu.convert(source, "generic/parallel", to_pv_range=(100, 400, "K"))
         assert conversion.factor == 1
         assert conversion.settings["kp"].value == pytest.approx(2.7)
 

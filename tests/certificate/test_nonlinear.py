@@ -240,8 +240,8 @@ def test_bumps_are_per_cent_of_the_output_range(source: str) -> None:
 
 
 def test_a_wider_measurement_range_of_the_target_does_not_count_as_a_larger_error() -> None:
-    source = settings("generic/standard", K=2, Ti=60, pv_range=(0, 100), op_range=(0, 100))
-    conversion = pidemu.convert(source, "iec/61131-3-pid", pv_range=(0, 400))
+    source = settings("generic/standard", K=2, Ti=60, pv_range=(0, 100, "degC"), op_range=(0, 100))
+    conversion = pidemu.convert(source, "iec/61131-3-pid", to_pv_range=(0, 400, "degC"))
     found = differences(source, conversion.settings)["windup"]
     assert found.figures[STAYS] == (0.0, 13.0)
 

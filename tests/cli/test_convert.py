@@ -187,7 +187,7 @@ def test_dials_are_rounded_to_the_target_s_resolution_and_the_effect_is_stated()
 
 
 def test_other_ranges_on_the_target_rescale_the_gain() -> None:
-    ranges = ("--pv-range", "0,200", "--op-range", "0,100", "--to-pv-range", "0,400", "--to-op-range", "0,50")
+    ranges = ("--pv-range", "0,200 K", "--op-range", "0,100 l/h", "--to-pv-range", "0,400 K", "--to-op-range", "0,50 l/h")
     assert dials(*PI, *ranges)["GAIN"] == 8.0
     assert converted(*PI, *ranges)["gain_factor"] == 4.0
 
@@ -198,7 +198,7 @@ def test_the_target_takes_the_source_s_ranges() -> None:
 
 
 def test_a_range_may_start_below_zero() -> None:
-    assert dials(*PI, "--pv-range", "-50,150", "--to-pv-range=-50,350")["GAIN"] == 4.0
+    assert dials(*PI, "--pv-range", "-50,150 degC", "--to-pv-range=-50,350 degC")["GAIN"] == 4.0
 
 
 LOOP = """\

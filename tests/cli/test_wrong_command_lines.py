@@ -19,6 +19,8 @@ _LINES = {
 _PI = "fisher/provox GAIN=2 RESET=4"
 _TO = "--to emerson/deltav"
 _EXAMPLE = 'write for example GAIN=2 or "RESET=20 s/repeat"'
+_RANGE = 'is not a range; write low and high with a unit, such as "0,400 degC"'
+_ENDS = "is not a range; give two finite numbers, low before high"
 _NUMBER = 'is not a number, nor a number with a unit such as "20 s/repeat"'
 _SCAN = "is no scan interval; write seconds, such as 0.5, or 1,0.5 for source and target"
 _LISTS = "'pidemu cards' lists them"
@@ -110,11 +112,8 @@ SETTINGS = {
         "emerson/deltav: unknown setting 'ALFA' (did you mean 'ALPHA'?); "
         "settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA, FORM, STRUCTURE"
     ),
-    f"convert {_PI} {_TO} --pv-range 200,0": "fisher/provox: pv_range: 200 to 0 is no range; give low, then high",
-    f"convert {_PI} {_TO} --pv-range 0,inf": "fisher/provox: pv_range: 0 to inf is no range; give low, then high",
-    f"convert {_PI} {_TO} --to-pv-range 0,200": "fisher/provox: the target's pv_range is given, the source's is not; give both",
-    f"convert {_PI} {_TO} --pv-range 0,100 --to-pv-range 200,0": (
-        "emerson/deltav: pv_range: 200 to 0 is no range; give low, then high"
+    f"convert {_PI} {_TO} --to-pv-range 0,200": (
+        "fisher/provox: the target's PV range is 0 to 200, the source's is not given; give both, also where they agree"
     ),
 }
 
@@ -141,10 +140,13 @@ USAGE = {
         "no CARD to convert from; for example: pidemu convert fisher/provox GAIN=2 RESET=4 --to emerson/deltav",
     ),
     f"convert {_PI}": ("convert", "no card to convert to; add --to CARD, 'pidemu cards' lists them"),
-    f"convert {_PI} {_TO} --pv-range 5": ("convert", "Invalid value for '--pv-range': '5' is not two numbers such as 0,200"),
-    f"convert {_PI} {_TO} --op-range low,high": (
+    f"convert {_PI} {_TO} --pv-range 5": ("convert", f"Invalid value for '--pv-range': '5' {_RANGE}"),
+    f"convert {_PI} {_TO} --op-range low,high": ("convert", f"Invalid value for '--op-range': 'low,high' {_RANGE}"),
+    f"convert {_PI} {_TO} --pv-range 200,0": ("convert", f"Invalid value for '--pv-range': 200 to 0 {_ENDS}"),
+    f"convert {_PI} {_TO} --pv-range 0,inf": ("convert", f"Invalid value for '--pv-range': 0 to inf {_ENDS}"),
+    f"convert {_PI} {_TO} --pv-range 0,100 --to-pv-range 200,0": (
         "convert",
-        "Invalid value for '--op-range': 'low,high' is not two numbers such as 0,200",
+        f"Invalid value for '--to-pv-range': 200 to 0 {_ENDS}",
     ),
     f"convert {_PI} {_TO} --match best": (
         "convert",

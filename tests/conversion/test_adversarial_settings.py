@@ -160,7 +160,8 @@ def test_an_integral_time_that_happens_to_be_an_off_value_does_not_switch_the_in
     assert conversion.settings.law().moments()[0] == pytest.approx(2 / Ti, rel=1e-3)
 
 
-OLD, NEW = {"pv_range": (0.0, 100.0), "op_range": (0.0, 80.0)}, {"pv_range": (50.0, 250.0), "op_range": (0.0, 100.0)}
+OLD = {"pv_range": (0.0, 100.0, "degC"), "op_range": (0.0, 80.0, "kg/h")}
+NEW = {"to_pv_range": (50.0, 250.0, "degC"), "to_op_range": (0.0, 100.0, "kg/h")}
 FACTOR = (200 / 100) * (80 / 100)
 PID_DIALS: dict[str, tuple[dict[str, object], tuple[str, str, str], tuple[float, float, float]]] = {
     # parallel, in percent: all three
@@ -183,7 +184,7 @@ def valve(s: Settings, sp: Floats, pv: Floats, start: float) -> Floats:
     assert s.pv_range is not None
     assert s.op_range is not None
     own = s.equation.signals == "engineering"
-    (zero, top), (low, high) = (0.0, 100.0) if own else s.pv_range, (0.0, 100.0) if own else s.op_range
+    (zero, top), (low, high) = ((0.0, 100.0), (0.0, 100.0)) if own else (s.pv_range.ends, s.op_range.ends)
     controller = pidemu.Controller(s, 1.0, output_limits=WIDE)
     sp, pv = (100 * (x - zero) / (top - zero) for x in (sp, pv))
     controller.rest(float(sp[0]), float(pv[0]), 100 * (start - low) / (high - low))
@@ -369,8 +370,8 @@ def test_a_scan_longer_than_the_loops_times_is_not_called_little(slow: float) ->
     assert "stays stable" not in conversion.sentence
 
 
-@pytest.mark.parametrize("bad", [(0, 0), (100, 0), (0, math.nan), (0, math.inf), (5,), 5, "0,100", ("a", "b"), (0, 1, 2)])
-@pytest.mark.parametrize("name", ["pv_range", "op_range"])
+@pytest.mark.parametrize("bad", [(0, 0), (100, 0), (0, math.nan), (0, math.inf), (5,), 5, "0,100,200", ("a", "b"), (0, 1, 2)])
+@pytest.mark.parametrize("name", ["to_pv_range", "to_op_range"])
 def test_a_range_of_the_target_that_is_none_is_an_error(name: str, bad: object) -> None:
     source = load("fisher/provox", **PROVOX, pv_range=(0, 100), op_range=(0, 100))
     with pytest.raises(SettingError, match=name):

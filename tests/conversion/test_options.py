@@ -170,7 +170,9 @@ def test_a_card_in_engineering_units_takes_the_ranges() -> None:
 
 def test_without_ranges_a_card_in_engineering_units_says_what_is_taken() -> None:
     source = pidemu.load_card("bailey/fc19").settings(KP=2, KI=0.5)
-    assert any("spans not given are taken as 100" in w for w in pidemu.convert(source, "emerson/deltav").warnings)
+    found = pidemu.convert(source, "emerson/deltav").warnings[:2]
+    assert [w.partition(",")[0] for w in found] == ["the PV range is not given", "the output range is not given"]
+    assert all(w.endswith("0 to 100 is taken") for w in found)
 
 
 @pytest.mark.parametrize("value", ["2 eu/eu", "50 eu", "2 %/eu"])

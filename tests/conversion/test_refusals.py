@@ -304,7 +304,7 @@ def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:
         ({"given": {"ALPHB": 0.1}}, "unknown setting 'ALPHB' (did you mean 'ALPHA'?)"),
         ({"given": {"ALPHA": 2}}, "outside 0.05 to 1"),
         ({"options": {"FORM": "Serie"}}, "did you mean 'Series'?"),
-        ({"pv_range": (0, 200)}, "the target's pv_range is given, the source's is not; give both"),
+        ({"to_pv_range": (0, 200)}, "the target's PV range is 0 to 200, the source's is not given; give both"),
     ],
 )
 def test_wrong_wishes_are_errors_and_no_refusals(arguments: dict[str, object], message: str) -> None:

@@ -341,8 +341,8 @@ ASKED: dict[str, tuple[str, dict[str, object], str, dict[str, Any]]] = {
     "low-frequency": ("generic/standard", STANDARD, "gnc-tools/cpid", {"match": "low-frequency"}),
     "options of the source": ("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.1, "CTEQN": "B"}, "generic/standard", {}),
     "ranges": (
-        "generic/standard", {**STANDARD, "pv_range": (-50, 150), "op_range": (0, 10)}, "arduino/pid",
-        {"pv_range": (0, 100), "op_range": (-5, 5), "allow_approximate": True},
+        "generic/standard", {**STANDARD, "pv_range": (-50, 150, "K"), "op_range": "0,10 V = 0..10 kg/h"}, "arduino/pid",
+        {"to_pv_range": (0, 100, "K"), "to_op_range": (-5, 5, "V"), "allow_approximate": True},
     ),
     "a process with all there is": (
         "generic/standard", {"K": 0.5, "Ti": 40}, "emerson/deltav",
@@ -467,8 +467,8 @@ def test_the_textbook_settings_are_a_third_line_only_where_they_are_others() -> 
 
 def test_with_other_ranges_the_source_is_shown_in_the_targets_percent() -> None:
     """An exact conversion to a range twice as wide: in the target's percent both curves are one."""
-    source = pidemu.load_card("generic/series").settings({**SERIES, "pv_range": (0, 100)})
-    c = convert(source, "generic/standard", pv_range=(0, 200), process=PROCESS)
+    source = pidemu.load_card("generic/series").settings({**SERIES, "pv_range": (0, 100, "bar")})
+    c = convert(source, "generic/standard", to_pv_range=(0, 200, "bar"), process=PROCESS)
     assert c.factor == 2
     r, loops = responses(c), closed_loops(c)
     assert r is not None

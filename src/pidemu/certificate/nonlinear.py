@@ -14,6 +14,7 @@ from pidemu.certificate.stages import error_differences, limit_differences, outp
 from pidemu.certificate.trials import Bench, Plan, planned
 from pidemu.certificate.windup import output_number, unknown_windup, windup_differences
 from pidemu.errors import PidemuError
+from pidemu.range_relation import Relation, relation
 from pidemu.record.sampling import limits_for
 from pidemu.settings import Settings
 from pidemu.units import Role
@@ -81,9 +82,8 @@ def nonlinear_differences(
 def _emulated(both: tuple[Side, Side], trial: Plan) -> Iterator[NonlinearDifference]:
     """Yield what differs at limits and transfers, or what the cards say of it where it cannot be tried."""
     source, target = both
-    span = 1.0
-    if source.settings.pv_range and target.settings.pv_range:
-        span = source.settings.spans.pv / target.settings.spans.pv
+    related = relation(source.settings.pv_range, target.settings.pv_range, "pv_range")
+    span = 1 / float(related.factor) if isinstance(related, Relation) else 1.0
     benches = []
     try:
         actions = acting_alike(target.settings, source.sign * target.sign)

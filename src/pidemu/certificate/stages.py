@@ -43,8 +43,7 @@ def _in_own_units(target: Side) -> str:
         return ""
     if target.settings.op_range is None:
         return f"; {target.name} has them in engineering units: give the range of the output to see them in %"
-    low, high = target.settings.op_range
-    return f"; 0 to 100 % is {low:g} to {high:g} there"
+    return f"; 0 to 100 % is {target.settings.op_range} there"
 
 
 def _span(limits: Pair, unit: str) -> str:
@@ -63,7 +62,7 @@ def _integral_limits(side: Side) -> Pair:
         return -math.inf, math.inf
     given = unlimited((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
     gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.holds]
-    zero = side.settings.op_range[0] if side.engineering and side.settings.op_range else 0.0
+    zero = side.settings.own_ranges[1].low
     low, high = sorted((gain * x - zero) * side.op_percent for x in given)
     return low, high
 

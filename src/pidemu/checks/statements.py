@@ -10,7 +10,7 @@ from pidemu.card.base import Status
 from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
 from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
-from pidemu.settings import RESERVED
+from pidemu.ranges import RANGES
 
 
 def reject_wrong_folder(card: Card) -> Iterator[Problem]:
@@ -105,7 +105,7 @@ def reject_ambiguous_names(card: Card) -> Iterator[Problem]:
     seen: dict[str, str] = {}
     for name in [*card.all_settings(), *card.data.options]:
         path = ("options", name) if name in card.data.options else ("settings", name)
-        if name in RESERVED:
+        if name in RANGES:
             yield card.document.problem(path, f"'{name}' is reserved for the signal range", at_key=True)
         if name.casefold() in seen:
             yield card.document.problem(path, f"'{name}' and '{seen[name.casefold()]}' cannot be told apart", at_key=True)

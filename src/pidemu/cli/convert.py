@@ -10,12 +10,13 @@ import click
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
-from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.common import Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import ActionError, ConversionRefusedError, QuestionError, SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
@@ -87,10 +88,10 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
 )
 @click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
-@click.option("--pv-range", type=Pair(), help="Measurement range of the source [engineering units].")
-@click.option("--op-range", type=Pair(), help="Output range of the source [engineering units].")
-@click.option("--to-pv-range", type=Pair(), help="Measurement range of the target; by default the source's.")
-@click.option("--to-op-range", type=Pair(), help="Output range of the target; by default the source's.")
+@click.option("--pv-range", type=Range(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
+@click.option("--op-range", type=Range(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
+@click.option("--to-pv-range", type=Range(), help="Measurement range of the target; by default the source's.")
+@click.option("--to-op-range", type=Range(), help="Output range of the target; by default the source's.")
 @click.option(
     "--cut-over", "now", metavar="SP,PV,OP", help="Setpoint, measurement and output now: how to change over without a bump."
 )
@@ -121,10 +122,10 @@ def command(
     allow_approximate: bool,
     digits: int,
     tag: str,
-    pv_range: tuple[float, float] | None,
-    op_range: tuple[float, float] | None,
-    to_pv_range: tuple[float, float] | None,
-    to_op_range: tuple[float, float] | None,
+    pv_range: SignalRange | None,
+    op_range: SignalRange | None,
+    to_pv_range: SignalRange | None,
+    to_op_range: SignalRange | None,
     now: str | None,
     action: str | None,
     page: str | None,
@@ -141,6 +142,7 @@ def command(
         values, card = (card, *values), None  # what stands first is a value then
     given = assignments(values)
     wanted = assignments(fixed, "NAME=VALUE after --set")
+    loop = None
     if loop_file is not None:
         from pidemu.conversion.loopfile import read_loop
 
@@ -155,12 +157,15 @@ def command(
         )
     if target is None:
         raise click.UsageError("no card to convert to; add --to CARD, 'pidemu cards' lists them")
+    to_ranges: dict[str, SignalRange | str | None] = {"to_pv_range": to_pv_range, "to_op_range": to_op_range}
+    if loop is not None:
+        to_ranges = {"to_pv_range": to_pv_range or loop.to_pv_range, "to_op_range": to_op_range or loop.to_op_range}
     ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
     goal = load_card(target, vendors)
     options, dials = split_options(goal, wanted)
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "runs_every": runs_every, "compensate": compensate, "mode": mode,
-        "action": action, "match": match, "digits": digits, "to_pv_range": to_pv_range, "to_op_range": to_op_range,
+        "action": action, "match": match, "digits": digits, **to_ranges,
         "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
     }  # fmt: skip
     if process is not None:

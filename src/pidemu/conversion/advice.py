@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from pidemu.action import action_line
 from pidemu.certificate.noise import noise_change
+from pidemu.conversion.spans import range_questions, rescaling, signals_note
 from pidemu.units import Role
 
 if TYPE_CHECKING:
@@ -38,17 +39,12 @@ def warnings_for(c: Conversion) -> Iterator[str]:
 
 
 def _ranges(c: Conversion) -> Iterator[str]:
-    if abs(c.factor) != 1:
-        yield (
-            f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
-            "engineering units"
-        )
-    for s in (c.source, c.settings):
-        if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
-            yield (
-                f"{s.card.id} computes in engineering units, and not all ranges were given: spans not given are taken as 100; "
-                "give the ranges of measurement and output"
-            )
+    yield from rescaling(c.source, c.request.to_pv_range, c.request.to_op_range).notes
+    for question in range_questions(c.source, c.settings):
+        yield f"{question.text}; 0 to 100 is taken"
+    note = signals_note(c.source, c.settings)
+    if note:
+        yield note
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:

@@ -14,7 +14,7 @@ from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
-from pidemu.conversion.asking import action_questions, ask, mode_is_open, mode_question
+from pidemu.conversion.asking import action_questions, ask, missing_ranges, mode_is_open, mode_question, scale_questions
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.modes import MODES, Mode
@@ -25,9 +25,11 @@ from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
+from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.ranges import RangeGiven
 from pidemu.scan.build import Action
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
@@ -49,8 +51,8 @@ def convert(
     runs_every: float | tuple[float, float] | None = None,
     mode: str = "both",
     action: str | None = None,
-    to_pv_range: object = None,
-    to_op_range: object = None,
+    to_pv_range: RangeGiven | None = None,
+    to_op_range: RangeGiven | None = None,
     match: str | None = None,
     process: Process | None = None,
     compensate: bool = False,
@@ -84,9 +86,10 @@ def convert(
         The control action, reverse: the output falls when the measurement rises (error SP - PV). The size of the dials does not
         depend on it; where the sign of the target's gain is the action, the gain gets that sign. Where that of the source's is, it
         is known without.
-    to_pv_range, to_op_range : tuple, optional
-        Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity
-        rescales the gains, the same signal on another scale does not.
+    to_pv_range, to_op_range : tuple or str, optional
+        Ranges of the target's measurement and output with their unit, ``(0, 1000, "degF")``; by default the source's. Another
+        range of the same quantity rescales the gain for the same effect in its units; the same signal on another scale, such as
+        counts, does not (see `pidemu.range_relation.relation`).
     match : str, optional
         How to match: ``"exact"``, ``"same-numbers"`` (the source's own), ``"low-frequency"``, ``"textbook"``,
         ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load
@@ -135,7 +138,7 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        pv_range=to_pv_range, op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)
@@ -148,7 +151,8 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     _refuse_absurd_gains(source)
     source = _paced(source, request)
     opens = tuple(unstated(source))
-    ask([*action_questions(source, request), *(o.question for o in opens if o.asked)], source, card, request)
+    open_questions = [o.question for o in opens if o.asked]
+    ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
     work = _Work(source, card, request, aim)
     ranking = work.ranking()
     if mode_is_open(source, ranking, request):
@@ -160,6 +164,7 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
         refusal += work.other_options()
         if settings is None:
             raise ConversionRefusedError(refusal)
+    ask(missing_ranges(source, settings), source, card, request)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
@@ -214,7 +219,7 @@ class _Work:
         self.card = card
         self.request = request
         self.aim = aim
-        self.factor = _rescaling(source, request)
+        self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
         self.fixed = {**_shared(source, card), **request.given}
         self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
         if request.scan is not None:
@@ -230,8 +235,8 @@ class _Work:
                 self.card,
                 named,
                 self.fixed,
-                request.pv_range or source.pv_range,
-                request.op_range or source.op_range,
+                request.to_pv_range or source.pv_range,
+                request.to_op_range or source.op_range,
                 request.pace[1],
             )
             goal.reject_missing()
@@ -353,16 +358,3 @@ def _textbook(solver: Solver) -> Textbook:
         return Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
         return Textbook(None, None, str(error))
-
-
-def _rescaling(source: Settings, request: Request) -> float:
-    """Return the factor on the percent gain for new ranges (specs/equations.md, section 3, rescaling)."""
-    factor = 1.0
-    for name, new, old, power in (
-        ("pv_range", request.pv_range, source.pv_range, 1), ("op_range", request.op_range, source.op_range, -1),
-    ):  # fmt: skip
-        if new is not None and old is None and new != (0.0, 100.0):
-            raise SettingError(f"{source.card.id}: the target's {name} is given, the source's is not; give both")
-        if new is not None and old is not None:
-            factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
-    return factor

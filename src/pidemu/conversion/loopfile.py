@@ -24,6 +24,8 @@ class LoopFile(Model):
     set_: dict[Text, str | Number] = Field(
         default={}, description="Options of the target, and dials that shall have a value.", alias="set"
     )
+    to_pv_range: Text | None = Field(default=None, description="Measurement range of the target: 0,1000 degF.")
+    to_op_range: Text | None = Field(default=None, description="Output range of the target: 0,100 %.")
     process: Text | None = Field(default=None, description="The process, as `--process` takes it: gain=1.5,lag=10,delay=3.")
     scan: Number | list[Number] | None = Field(
         default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
@@ -39,9 +41,13 @@ class Loop:
     card, to : str
         Source and target card.
     settings, set : dict
-        What is given for the source and for the target.
+        What is given for the source and for the target; ``pv_range`` and ``op_range`` among `settings` are the source's.
     scan : float, tuple of float or None
         Scan interval of both, or of source and target [s].
+    process : str or None
+        The process.
+    to_pv_range, to_op_range : str or None
+        The target's ranges, as they are written.
     """
 
     card: str
@@ -50,6 +56,8 @@ class Loop:
     set: dict[str, Any]
     scan: float | tuple[float, float] | None
     process: str | None = None
+    to_pv_range: str | None = None
+    to_op_range: str | None = None
 
 
 def read_loop(file: Path) -> Loop:
@@ -74,4 +82,5 @@ def read_loop(file: Path) -> Loop:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
     intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
     scan = None if not intervals else intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
-    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process)
+    ranges = (loop.to_pv_range, loop.to_op_range)
+    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process, *ranges)

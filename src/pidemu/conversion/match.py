@@ -96,7 +96,7 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     if not filt.free and not (kd and d1):
         raise NoMatchError("there is no derivative with a filter to set the multiplier by")
     if not filt.free:
-        return (Numbers(kp, n0, kd, multiplier=abs(filt.ratio * kd / d1)),)
+        return (Numbers(kp, n0, kd, multiplier=abs(filt.ratio * kd / (d1 * target.percent_per_unit))),)
     if target.has_proportional:
         return (Numbers(kp, n0, kd, d1),)
     if abs(kp) > 0:

@@ -15,6 +15,7 @@ from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
+from pidemu.ranges import SignalRange
 from pidemu.reading import signal_range
 from pidemu.scan.build import Action
 
@@ -36,8 +37,8 @@ class Request:
         These intervals per those that the algorithms compute with.
     mode, action, match, tag
         As in `convert`.
-    pv_range, op_range : tuple of float or None
-        Signal ranges of the target.
+    to_pv_range, to_op_range : SignalRange or None
+        Ranges of the target's measurement and output.
     process : Process or None
         The process.
     digits : int or None
@@ -53,8 +54,8 @@ class Request:
     mode: Modes = "both"
     action: Action | None = None
     match: str | None = None
-    pv_range: tuple[float, float] | None = None
-    op_range: tuple[float, float] | None = None
+    to_pv_range: SignalRange | None = None
+    to_op_range: SignalRange | None = None
     process: Process | None = None
     digits: int | None = None
     compensate: bool = False
@@ -73,9 +74,9 @@ class Request:
                 yield from ("--runs-every", _intervals(self.scan))
         if self.mode != "both":
             yield from ("--mode", self.mode)
-        for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
-            if ends is not None:
-                yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
+        for name, given in zip(RANGES, (self.to_pv_range, self.to_op_range), strict=True):
+            if given is not None:
+                yield f"{option_of(name, target=True)}={read_range(given).argument}"
         if self.match is not None:
             yield from ("--match", self.match)
         if self.action is not None:
@@ -108,8 +109,8 @@ def read_request(
     mode: object,
     action: object,
     match: str | None,
-    pv_range: object,
-    op_range: object,
+    to_pv_range: object,
+    to_op_range: object,
     process: Process | None,
     digits: object,
     compensate: bool,
@@ -146,8 +147,8 @@ def read_request(
         mode=read_mode(mode),
         action=read_action(action),
         match=match,
-        pv_range=signal_range(card, "pv_range", pv_range),
-        op_range=signal_range(card, "op_range", op_range),
+        to_pv_range=signal_range(card, "to_pv_range", to_pv_range),
+        to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
         compensate=compensate,

@@ -15,6 +15,7 @@ from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
@@ -139,8 +140,8 @@ class Target:
         Options by name.
     given : mapping
         Dials that the user has fixed.
-    pv_range, op_range : tuple of float, optional
-        Signal ranges.
+    pv_range, op_range : SignalRange, optional
+        Ranges of measurement and output.
     pace : float
         Interval at which the target is really executed per the one that it computes with; see `Settings.pace`.
     """
@@ -150,8 +151,8 @@ class Target:
         card: Card,
         options: Mapping[str, object],
         given: Mapping[str, object],
-        pv_range: tuple[float, float] | None,
-        op_range: tuple[float, float] | None,
+        pv_range: SignalRange | None,
+        op_range: SignalRange | None,
         pace: float = 1.0,
     ) -> None:
         self.card = card
@@ -210,6 +211,11 @@ class Target:
     def has_derivative(self) -> bool:
         """Whether there is a derivative term."""
         return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
+
+    @property
+    def percent_per_unit(self) -> float:
+        """Percent gain that a gain of 1 in the card's own signals amounts to [%/%]."""
+        return float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
 
     def _find_filter(self) -> TargetFilter:
         filt = self.variant.equation.derivative.filter
@@ -286,7 +292,7 @@ class Target:
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
         scale = self.multiplier if n.multiplier is None else n.multiplier
-        engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        engineering = self.percent_per_unit
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
@@ -362,7 +368,7 @@ class Target:
         """Return the derivative time that the filter's ratio or gain refers to [s], for numbers that may be arrays."""
         scale = self.multiplier if n.multiplier is None else n.multiplier
         parallel = self.form is Form.PARALLEL
-        scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        scale *= self.percent_per_unit
         time = n.kd / scale if parallel else 0.0 if _is_zero(n.K) else n.kd / n.K
         return time / (1 + time * n.ki / n.K) if self.filter.effective and not _is_zero(time) else time
 

@@ -28,6 +28,7 @@ from pidemu.conversion.result import Conversion
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
+from pidemu.ranges import SignalRange
 from pidemu.report.command import command_for
 from pidemu.report.curves import Who, bode, closed_loops, responses
 from pidemu.report.pictures import bode_picture, loops_picture, responses_picture
@@ -265,8 +266,8 @@ class Contents:
         )
 
 
-def _range(given: tuple[float, float] | None) -> str:
-    return f"{number(given[0])} to {number(given[1])}" if given else "not given"
+def _range(given: SignalRange | None) -> str:
+    return str(given) if given else "not given"
 
 
 def _intervals(scans: tuple[float, float]) -> str:
