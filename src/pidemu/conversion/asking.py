@@ -103,7 +103,18 @@ def missing_ranges(source: Settings, settings: Settings) -> list[Question]:
     return [
         _of_range(source, found, (Answer("0 to 100", f"or give it: {found.example}", given={found.about: (0, 100)}),))
         for found in range_questions(source, settings)
+        if not (found.about == "op_range" and _output_is_percent(source, settings))
     ]
+
+
+def _output_is_percent(*both: Settings) -> bool:
+    """Whether controllers that compute in engineering units have their output in percent, by the limits that their cards state."""
+    limits = [s.equation.output.limits for s in both if s.equation.signals == "engineering"]
+    return bool(limits) and all(low >= _PERCENT[0] and high <= _PERCENT[1] and high - low >= 100 for low, high in limits)
+
+
+_PERCENT: Final = (-10.0, 110.0)
+"""Between these output limits in percent lie."""
 
 
 def _of_range(source: Settings, found: RangeQuestion, answers: tuple[Answer, ...]) -> Question:

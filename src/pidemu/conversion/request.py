@@ -15,7 +15,7 @@ from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
-from pidemu.ranges import SignalRange
+from pidemu.ranges import RANGES, SignalRange, option_of, read_range
 from pidemu.reading import signal_range
 from pidemu.scan.build import Action
 
