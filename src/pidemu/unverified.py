@@ -14,7 +14,6 @@ from pidemu.law import Law
 from pidemu.settings import Settings, Value
 from pidemu.units import parse_unit, to_canonical
 
-_RULES: Final = ("rule", "holds")
 _NEVER: Final = ("sets", "about", "range", "resolution", "scope")
 """What is said of a dial beside its unit, its default and what switches it off."""
 _NOT_PRINTED: Final = ("faults", "signals", "cascade", "feedforward", "transfer.changes", "transfer.preset")
@@ -42,9 +41,8 @@ def unverified_law(settings: Settings, *, rules: bool = False) -> list[Statement
     found: dict[str, Statement] = {s.key: s for s in _options(settings)}
     for s in _statements(settings):
         head, *rest = s.path.split(".")
-        if (s.makes_the_law and head != "signals") or (rules and head in ("integral", "derivative") and rest[-1] in _RULES[:1]):
-            found.setdefault(s.key, s)
-        elif head == "cascade":
+        of_the_law = (s.makes_the_law and head != "signals") or head == "cascade"
+        if of_the_law or (rules and head in ("integral", "derivative") and rest[-1] == "rule"):
             found.setdefault(s.key, s)
     return list(found.values())
 
