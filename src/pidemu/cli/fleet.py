@@ -156,10 +156,9 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
         worst = sorted(ran, key=_badness, reverse=True)[:_ROWS]
         columns = [*_COLUMNS, *(_MARGINS if any(row["Ms"] is not None for row in worst) else ())]
         remarks = [_remark(row) for row in worst]
-        cells = [
-            [*_cells(row)[: len(columns)], *([said] if any(remarks) else [])] for row, said in zip(worst, remarks, strict=True)
-        ]
-        table([*columns, *([""] if any(remarks) else [])], cells, right=range(2, len(columns)))
+        last = [""] if any(remarks) else []
+        cells = [[*_cells(row)[: len(columns)], said][: len(columns) + len(last)] for row, said in zip(worst, remarks, strict=True)]
+        table([*columns, *last], cells, right=range(2, len(columns)))
     failed = [row for row in rows if row["status"] == "failed"]
     if failed:
         heading("\nFailed")

@@ -32,7 +32,8 @@ class SignalStore:
 
     In a folder, ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%], NaN after a loop's last scan; `INDEX`
     names the file, the loop's number in it, scan interval [s] and number of scans for every tag. A Parquet file has a row per loop:
-    tag, card, status, scan interval, figures, margins, and the lists ``output`` and ``measurement``; it appears when the run is over.
+    tag, card, status, scan interval, figures, margins, and the lists ``output`` and ``measurement``; it appears when the run is
+    over.
 
     Parameters
     ----------

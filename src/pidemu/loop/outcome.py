@@ -65,8 +65,8 @@ def margins_of(trial: Trial) -> LoopFigures | None:
 def stability_of(trial: Trial, margins: LoopFigures | None) -> bool | None:
     """Return whether a trial's loop is stable; ``None`` where that is not known.
 
-    With positive feedback a loop whose gain is 1 or more at zero frequency, as an integral's is, has a real unstable pole: ``1 - L``
-    is not above zero there and goes to 1 at high frequencies.
+    With positive feedback a loop whose gain is 1 or more at zero frequency, as an integral's is, has a real unstable pole:
+    ``1 - L`` is not above zero there and goes to 1 at high frequencies.
 
     Parameters
     ----------
