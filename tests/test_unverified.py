@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pidemu
-from pidemu.unverified import unverified_law, unverified_lines, unverified_program
+from pidemu.unverified import facts, unverified_law, unverified_program
 
 
 def law_paths(card: str, *, rules: bool = False, **given: object) -> list[str]:
@@ -46,7 +46,7 @@ def test_a_program_without_integral_rests_on_no_windup_scheme() -> None:
 
 def test_a_line_says_status_field_value_and_why() -> None:
     settings = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    assert unverified_lines(unverified_law(settings))[1] == (
+    assert str(facts(unverified_law(settings))[1]) == (
         "assumed: derivative.filter.ratio = 0.125 "
         "(not found for PROVOX; 0.1 to 0.125 is what Smuts calls usual for controllers in general)"
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from pidemu.units import parse_unit, to_canonical
 
 _NEVER: Final = ("sets", "about", "range", "resolution", "scope")
 """What is said of a dial beside its unit, its default and what switches it off."""
+_ACTION: Final = ("action.names", "action.reverse")
 _NOT_PRINTED: Final = ("faults", "signals", "cascade", "feedforward", "transfer.changes", "transfer.preset")
 """What no printed program has: inputs for them, or a change while it runs."""
 _FREQUENCIES: Final = np.geomspace(1e-6, 1e3, 37)
@@ -23,7 +25,42 @@ _SAME: Final = 1e-12
 """Largest relative difference of two laws that are the same."""
 
 
-def unverified_law(settings: Settings, *, rules: bool = False) -> list[Statement]:
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A field of a card that no source states.
+
+    Attributes
+    ----------
+    path : str
+        The field, such as ``derivative.filter.ratio``; of an option that was not chosen, its name.
+    value : str
+        What the card says.
+    status : {"assumed", "inferred"}
+        How sure it is.
+    why : str
+        Why it is taken so.
+    """
+
+    path: str
+    value: str
+    status: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.status}: {self.path} = {self.value}" + (f" ({self.why})" if self.why else "")
+
+
+def facts(statements: Iterable[Statement]) -> tuple[Fact, ...]:
+    """Return statements with what their evidence says: its note, else the place in its source."""
+    found = ((s, s.evidence) for s in statements)
+    return tuple(
+        Fact(s.path, _written(s.value), e.status.value, e.note or ", ".join(filter(None, (e.source, e.at))))
+        for s, e in found
+        if e is not None
+    )
+
+
+def unverified_law(settings: Settings, *, rules: bool = False, action: bool = False) -> list[Statement]:
     """Return what the linear law at these settings rests on and no source states.
 
     Parameters
@@ -32,6 +69,8 @@ def unverified_law(settings: Settings, *, rules: bool = False) -> list[Statement
         The settings.
     rules : bool
         Whether the scan rules of the terms count as well, as they do at a scan interval.
+    action : bool
+        Whether the vendor's error and words for the action count as well.
 
     Returns
     -------
@@ -43,6 +82,9 @@ def unverified_law(settings: Settings, *, rules: bool = False) -> list[Statement
         head, *rest = s.path.split(".")
         of_the_law = (s.makes_the_law and head != "signals") or head == "cascade"
         if of_the_law or (rules and head in ("integral", "derivative") and rest[-1] == "rule"):
+            found.setdefault(s.key, s)
+    for s in settings.variant.statements() if action else ():
+        if (s.is_assumed or s.is_inferred) and s.path.startswith(_ACTION):
             found.setdefault(s.key, s)
     return list(found.values())
 
@@ -65,18 +107,6 @@ def unverified_program(settings: Settings, *, scan: bool = False, limits: bool =
     given = {"scan.default": scan, "output.limits": limits}
     made = [s for s in _statements(settings) if not (given.get(s.path) or s.path.startswith(_NOT_PRINTED))]
     return [*_options(settings), *made]
-
-
-def unverified_lines(statements: list[Statement]) -> list[str]:
-    """Return each statement as ``status: path = value (why)``."""
-    return [f"{s.evidence.status.value}: {with_why(s)}" for s in statements if s.evidence is not None]
-
-
-def with_why(statement: Statement) -> str:
-    """Return ``path = value (why)``, with what the evidence says: its note, else the place in its source."""
-    e = statement.evidence
-    why = "" if e is None else e.note or ", ".join(filter(None, (e.source, e.at)))
-    return f"{statement.path} = {_written(statement.value)}" + (f" ({why})" if why else "")
 
 
 def _written(value: object) -> str:
@@ -114,7 +144,7 @@ def _same_law(settings: Settings, option: str, choice: str) -> bool:
         other = settings.changed({option: choice})
         laws = [Law(s.algorithm(), 1.0 if s.algorithm().dahlin else None) for s in (settings, other)]
         frequencies = _FREQUENCIES[_FREQUENCIES < 3] if laws[0].scan else _FREQUENCIES
-        pairs = [[law.response(frequencies, path) for law in laws] for path in ("feedback", "setpoint")]  # type: ignore[arg-type]
+        pairs = [[law.response(frequencies, path) for law in laws] for path in ("feedback", "setpoint")]
     except PidemuError:  # with another choice these dials mean nothing
         return False
     return all(bool(np.all(np.abs(x - y) <= _SAME * np.abs(x))) for x, y in pairs)

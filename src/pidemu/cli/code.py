@@ -14,7 +14,7 @@ from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
-from pidemu.unverified import unverified_lines, unverified_program
+from pidemu.unverified import facts, unverified_program
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
@@ -62,10 +62,10 @@ def command(
 
 def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
     """Return what the comment at the top says of the card's evidence."""
-    found = unverified_lines(unverified_program(settings, scan=scan, limits=limits))
+    found = facts(unverified_program(settings, scan=scan, limits=limits))
     if not found:
         return [f"Every field of the card {settings.card.id} that makes this program is documented or measured."]
-    return [f"Assumed or inferred in the card {settings.card.id}, and at work here:", *(f"- {line}" for line in found)]
+    return [f"Assumed or inferred in the card {settings.card.id}, and at work here:", *(f"- {fact}" for fact in found)]
 
 
 def _name(card_id: str) -> str:

@@ -100,7 +100,7 @@ def command(
     """Run CARD with the settings NAME=VALUE in a closed loop with a process, from rest at 50 %, and print its figures.
 
     Errors count from the load step on, or from the start where there is none. The measurement has settled where the error moves
-    over less than 5 % of its largest value in the last fifth of the run. The margins are those of the sampled loop within its limits.
+    over less than 5 % of its largest value in the last fifth of the run. The margins are those of the sampled loop within limits.
     """
     settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
