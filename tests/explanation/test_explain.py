@@ -123,8 +123,8 @@ def test_the_summary_says_it_all() -> None:
     assert explained("fisher/provox", GAIN=2, RESET=4, RATE=0.1).summary.splitlines() == [
         "PID controller, series form: K 2, Ti 15 s (4 repeats/min), Td 6 s; a filter of 0.75 s on the derivative (lead-lag). "
         "In the standard form K 2.7, Ti 20.25 s (2.963 repeats/min), Td 3.694 s.",
-        "A 10 % step of PV moves the output by 160 % at once; when the derivative has died out (about 3 s), 27 % remain, on top of "
-        "a ramp of 80 % per minute.",
+        "A 10 % step of PV moves the output by 160 % at once; when the derivative has died out (about 3 s), the output has moved by "
+        "27 %, plus a ramp of 80 % per minute since the step.",
         "P and I act on the error, D acts on PV alone: a 10 % step of SP moves the output by 20 % at once.",
         "Reverse acting (error SP - PV, here 'Reverse') the output falls when PV rises; direct acting (error PV - SP, here "
         "'Direct') it rises.",
@@ -222,9 +222,21 @@ def test_a_filter_on_the_measurement_is_told_apart_from_that_of_the_derivative()
     e = explained("yokogawa/fieldbus-pid", GAIN=0.6, RESET=8, PV_FTIME=2)
     assert [(f.on, f.time) for f in e.filters] == [("measurement", 2.0)]
     assert e.automatic.responses is not None
-    assert (e.automatic.responses.measurement_kick, e.automatic.responses.noise_gain) == (0.0, 0.0)
+    assert e.automatic.responses.measurement_kick == 0.0
+    corner = 0.6 * abs(1 + 1 / (8 * 0.5j)) / math.sqrt(2)  # PI behind 1/(1 + 2 s) falls from its corner on, at 0.5 rad/s
+    assert e.automatic.responses.noise_gain == pytest.approx(corner)
     assert e.ramp is not None
     assert e.ramp.jump == pytest.approx(0.6 * (1 - 2 / 8))  # K (1 - Tf/Ti), equations section 2
+
+
+def test_a_filter_that_the_card_refers_to_the_effective_derivative_time_keeps_the_number_of_its_dial() -> None:
+    """The block's KD is 10 for tau = (1/KD)/(1/INT + 1/DERIV)."""
+    e = explained("foxboro/ia-pid", PBAND=50, INT=2, DERIV=0.3, KD=10)
+    assert (e.filters[0].on, e.filters[0].order) == ("measurement", 2)
+    assert e.filters[0].ratio == pytest.approx(0.1)
+    assert e.summary.splitlines()[2].startswith(
+        "A 10 % step of PV moves nothing at once; when the derivative has died out and the "
+    )
 
 
 def test_only_what_matters_at_these_settings_is_said_to_be_unverified() -> None:

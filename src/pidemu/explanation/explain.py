@@ -10,7 +10,7 @@ from pidemu.canonical import default_scan
 from pidemu.card.base import Form
 from pidemu.errors import ScanError
 from pidemu.explanation.dials import dials_of, not_stated, ranges_missing
-from pidemu.explanation.forms import Forms, forms_of
+from pidemu.explanation.forms import Forms, Times, forms_of
 from pidemu.explanation.model import Explanation, FilterFacts, Mode
 from pidemu.explanation.responses import in_cascade, ramp_of, responses_of
 from pidemu.explanation.words import action_words, summary_of
@@ -110,14 +110,16 @@ def _filter_place(settings: Settings) -> str:
 
 def _filters(settings: Settings, a: Algorithm, forms: Forms | None) -> Iterator[FilterFacts]:
     """Yield the filters at work, that of the derivative first."""
-    if a.has_term_filter or a.has_signal_filter:
-        yield FilterFacts(_filter_place(settings), a.Tf, _ratio(a, forms), a.filter_order)
+    filt = settings.equation.derivative.filter
+    if filt is not None and (a.has_term_filter or a.has_signal_filter):
+        own = "standard" if filt.of == "effective-derivative" or not a.series else "series"
+        yield FilterFacts(_filter_place(settings), a.Tf, _ratio(a, forms, own), a.filter_order)
     for on, lag in (("measurement", a.pv_filter), ("error", a.e_filter), ("setpoint", a.sp_filter)):
         if lag is not None:
             yield FilterFacts(on, lag.time)
 
 
-def _ratio(a: Algorithm, forms: Forms | None) -> float | None:
-    """Return the filter time per derivative time of the controller's own form, where both go together."""
-    own = None if forms is None else forms.series if a.series else forms.standard
-    return a.Tf / own.Td if own is not None and own.Td else None
+def _ratio(a: Algorithm, forms: Forms | None, own: str) -> float | None:
+    """Return the filter time per derivative time of a form, where there are both."""
+    times: Times | None = None if forms is None else getattr(forms, own)
+    return a.Tf / times.Td if times is not None and times.Td else None

@@ -51,7 +51,8 @@ class FilterFacts:
     time : float
         Filter time [s].
     ratio : float or None
-        Filter time per derivative time of the controller's own form; ``None`` where it has nothing to do with it.
+        Filter time per derivative time: of the series form for a series controller whose card does not refer it to the equivalent
+        standard form, else of the standard form; ``None`` where there is no derivative.
     order : {1, 2}
         Its order.
     """

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pidemu.algorithm import Algorithm
 from pidemu.law import Law
 from pidemu.rational import Rational
@@ -20,7 +22,8 @@ class Responses:
         What the output moves by at once [%/%]; infinite with a derivative that has no filter. At a scan interval: in the first
         scan.
     noise_gain : float
-        The gain for the fastest changes of the measurement [%/%]: at infinite frequency, at a scan interval at half the scan rate.
+        The gain for the fastest changes of the measurement [%/%]: at infinite frequency; where a filter lets nothing through there,
+        the largest above the corner of the fastest filter; at a scan interval, at half the scan rate.
     """
 
     measurement_kick: float
@@ -69,7 +72,7 @@ def responses_of(a: Algorithm, scan: float | None = None) -> Responses:
     law = Law(a, scan)
     if scan is None:
         kick = _at_once(law.feedback)
-        return Responses(kick, law.kick(), abs(kick))
+        return Responses(kick, law.kick(), abs(kick) or _beyond_the_corner(law))
     fastest = math.pi / scan * (1 - 1e-9)
     first = law.feedback.num[0] / law.feedback.den[0]
     return Responses(first, law.kick(), float(abs(law.response(fastest))))
@@ -79,6 +82,17 @@ def ramp_of(a: Algorithm) -> Ramp:
     """Return what a step of the measurement comes to: the first two moments (specs/equations.md, section 2)."""
     slope, jump, _ = Law(a).moments()
     return Ramp(jump, slope)
+
+
+def _beyond_the_corner(law: Law) -> float:
+    """Return the largest gain above the corner of the fastest filter; 0 where there is none."""
+    a = law.algorithm
+    times = [
+        a.Tf if a.has_signal_filter or a.has_term_filter else 0.0,
+        *(f.time for f in (a.pv_filter, a.e_filter) if f is not None),
+    ]
+    fastest = min((t for t in times if t), default=0.0)
+    return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0
 
 
 def _at_once(r: Rational) -> float:

@@ -76,31 +76,43 @@ def _filtered(e: Explanation) -> str:
 
 
 def _measurement_step(e: Explanation, a: Algorithm) -> str:
-    """Return what a step of the measurement does: at once, when the derivative has died out, and from then on."""
+    """Return what a step of the measurement does: at once, when derivative and filters have died out, and from then on."""
     assert e.ramp is not None
     assert e.automatic.responses is not None
     jump, slope, kick = abs(e.ramp.jump), abs(e.ramp.slope), abs(e.automatic.responses.measurement_kick)
     size = next((s for s in _STEPS if s * jump < _MOST), _STEPS[-1])
-    unit = "%" if e.gain_unit == "%/%" else "units"
-    per_minute = f"{four(60 * size * slope)} {unit} per minute"
-    opposite = e.ramp.jump * e.ramp.slope < 0
-    step = f"A {four(size)} {'%' if unit == '%' else 'unit'} step of PV"
-    if not a.kd and not any(f.on in ("measurement", "output", "error") for f in e.filters):
+    ramp = f"{_moved(e, 60 * size * slope)} per minute" if slope else ""
+    step = f"{_step(e, size)} of PV"
+    filtered = any(f.on in ("measurement", "output", "error") for f in e.filters)
+    if not a.kd and not filtered:
         if not jump:
-            return f"{step} moves nothing at once: the output ramps at {per_minute}."
-        return f"{step} moves the output by {four(size * jump)} {unit} at once{_goes_on(slope, per_minute, opposite)}."
-    first = "spikes the output for one scan" if math.isinf(kick) else f"moves the output by {four(size * kick)} {unit} at once"
-    settled = "the derivative has died out" if a.kd else "the filter has settled"
+            return f"{step} moves nothing at once: the output ramps at {ramp}."
+        way = "back" if e.ramp.jump * e.ramp.slope < 0 else "on"
+        then = f" at once, and then {way} at {ramp}" if ramp else " at once, where it stays"
+        return f"{step} moves the output by {_moved(e, size * jump)}{then}."
+    first = "spikes the output for one scan" if math.isinf(kick) else f"moves {_output(e, size * kick)} at once"
+    what = " and ".join(
+        word for word, there in (("the derivative has died out", a.kd), ("the filter has settled", filtered)) if there
+    )
     after = max((f.time for f in e.filters if f.on != "setpoint"), default=0.0)
     when = f" (about {four(_LASTS * after)} s)" if after else ""
-    ramp = f", {'against' if opposite else 'on top of'} a ramp of {per_minute}" if slope else ""
-    return f"{step} {first}; when {settled}{when}, {four(size * jump)} {unit} remain{ramp}."
+    turned = "minus" if e.ramp.jump * e.ramp.slope < 0 else "plus"
+    rest = f", {turned} a ramp of {ramp} since the step" if ramp else ", and it stays there"
+    return f"{step} {first}; when {what}{when}, the output has moved by {_moved(e, size * jump)}{rest}."
 
 
-def _goes_on(slope: float, per_minute: str, opposite: bool) -> str:
-    if not slope:
-        return ", where it stays"
-    return f", and then {'back' if opposite else 'on'} at {per_minute}"
+def _moved(e: Explanation, x: float) -> str:
+    """Return an amount of the output."""
+    text = four(x)
+    return f"{text} %" if e.gain_unit == "%/%" else f"{text} unit" if text == "1" else f"{text} units"
+
+
+def _output(e: Explanation, x: float) -> str:
+    return f"the output by {_moved(e, x)}" if x else "nothing"
+
+
+def _step(e: Explanation, size: float) -> str:
+    return f"A {four(size)} {'%' if e.gain_unit == '%/%' else 'unit'} step"
 
 
 def _setpoint_steps(e: Explanation) -> Iterator[str]:
@@ -126,12 +138,10 @@ def _listed(words: list[str]) -> str:
 
 def _setpoint_step(e: Explanation, mode: Mode) -> str:
     assert mode.responses is not None
-    kick = abs(mode.responses.setpoint_kick)
-    unit = "%" if e.gain_unit == "%/%" else "units"
-    step = f"a 10 {'%' if unit == '%' else 'unit'} step of SP"
+    kick, step = abs(mode.responses.setpoint_kick), f"a{_step(e, 10.0)[1:]} of SP"
     if math.isinf(kick):
         return f"{step} spikes the output for one scan (unfiltered derivative on the error)"
-    return f"{step} moves the output by {four(10 * kick)} {unit} at once" if kick else f"{step} moves nothing at once"
+    return f"{step} moves {_output(e, 10 * kick)} at once"
 
 
 def action_words(settings: Settings, reverse: bool | None) -> str:
