@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu import Loop
 from pidemu.loop.outcome import feedback_is_negative, has_settled, late_scan, margins_of, stability_of
 from pidemu.loop.trial import trial
+from tests.fleet.support import mixed
 
 PROCESS = pidemu.Process.from_lags(1.0, [10], delay=2)
 
@@ -62,3 +64,18 @@ def test_a_card_without_choice_of_action_has_the_sign_of_its_gain() -> None:
     settings = pidemu.load_card("ros/control-toolbox").settings(p=-2, i=-0.1)
     assert feedback_is_negative(trial(settings, pidemu.Process.from_lags(-1.0, [10]), 0.5))
     assert not feedback_is_negative(trial(settings, PROCESS, 0.5, action="direct"))
+
+
+LINEAR = [loop for loop in mixed() if not loop.settings.algorithm().beyond_the_law]
+
+
+@pytest.mark.parametrize("loop", LINEAR[::5], ids=lambda loop: loop.tag)
+def test_loops_of_all_cards_die_out_without_limits_where_they_are_called_stable_and_only_there(loop: Loop) -> None:
+    """The oracle is the emulation: 2,000 scans after a small setpoint step, the last quarter against the first."""
+    given: dict[str, Any] = {"time": 2000 * (loop.scan or 1.0), "setpoint": (1, 1e-3), "load": 0, "action": loop.action}
+    made = trial(loop.settings, loop.process, loop.scan, output_limits=(-1e9, 1e9), **given)
+    ran = pidemu.simulate(loop.settings, loop.process, loop.scan, output_limits=(-1e9, 1e9), engine="python", **given)
+    with np.errstate(all="ignore"):
+        moves = np.abs(np.diff(ran.measurement))
+    first, last = moves[:500].max(), moves[-500:].max()
+    assert stability_of(made, margins_of(made)) in (None, bool(last < 0.5 * max(first, 1e-12)))
