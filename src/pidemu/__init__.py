@@ -28,6 +28,8 @@ if TYPE_CHECKING:
         SettingError,
         UnitError,
     )
+    from pidemu.explanation.explain import explain
+    from pidemu.explanation.model import Explanation
     from pidemu.fleet.fleet import Fleet
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
@@ -63,6 +65,8 @@ _HOMES = {
     "SettingError": "errors",
     "UnitError": "errors",
     "Event": "signals",
+    "Explanation": "explanation.model",
+    "explain": "explanation.explain",
     "Fleet": "fleet.fleet",
     "FleetResult": "fleet.result",
     "Loop": "fleet.loops",
@@ -86,6 +90,7 @@ __all__ = [
     "ConversionRefusedError",
     "EngineError",
     "Event",
+    "Explanation",
     "Fleet",
     "FleetError",
     "FleetResult",
@@ -107,6 +112,7 @@ __all__ = [
     "cards",
     "compare",
     "convert",
+    "explain",
     "load_card",
     "read_loops",
     "read_record",

@@ -13,7 +13,7 @@ from tests.cli.helpers import Said, said
 _LINES = {
     "convert": "convert [OPTIONS] [CARD] NAME=VALUE...",
     "run": "run [OPTIONS] CARD NAME=VALUE...",
-    "show": "show [OPTIONS] CARD [OPTION=CHOICE]...",
+    "show": "show [OPTIONS] CARD [NAME=VALUE]...",
     "cards": "cards [OPTIONS] [WORD]",
 }
 _PI = "fisher/provox GAIN=2 RESET=4"
@@ -46,12 +46,15 @@ CARDS_AND_OPTIONS = {
     "show provox": f"no card 'provox' (did you mean 'fisher/provox'?); {_LISTS}",
     "show ../fisher/provox": f"no card '../fisher/provox' (did you mean 'fisher/provox'?); {_LISTS}",
     "show block.yaml": "no file 'block.yaml'",
-    "show fisher/provox FORM=Series": "fisher/provox: unknown option 'FORM'; options: none",
-    "show emerson/deltav FROM=Series": "emerson/deltav: unknown option 'FROM' (did you mean 'FORM'?); options: FORM, STRUCTURE",
+    "show fisher/provox FORM=Series": "fisher/provox: unknown setting or option 'FORM'; settings: GAIN, RESET, RATE; options: none",
+    "show emerson/deltav FROM=Series": (
+        "emerson/deltav: unknown setting or option 'FROM' (did you mean 'FORM'?); settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA; "
+        "options: FORM, STRUCTURE"
+    ),
     "show emerson/deltav FORM=Seris": (
         "emerson/deltav: option FORM has no choice 'Seris' (did you mean 'Series'?); choices: Standard, Series"
     ),
-    "show emerson/deltav FORM": "'FORM' is not OPTION=CHOICE; write for example FORM=Series",
+    "show emerson/deltav FORM": "'FORM' is not NAME=VALUE; write for example GAIN=2 or \"RESET=20 s/repeat\"",
     "check nowhere": "no file or folder 'nowhere'",
     "check empty": "no .yaml file below 'empty'",
     "check --vendors nowhere": "no folder 'nowhere'; a folder of cards holds <vendor>/<block>.yaml",
