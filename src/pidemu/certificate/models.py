@@ -274,6 +274,8 @@ class Certificate:
         Whether the settings make up for the scans: what counts is then the laws at the scan intervals, else the continuous ones.
     time_scale : float
         The source's effective integral time, which places the loop band [s].
+    shifts_for_good : bool
+        Whether a limit leaves the two apart for good, as nothing integrates and the target forgets where it was.
     scan_by_scan : ScanByScan or None
         Both controllers emulated; ``None`` where they cannot be, see `not_emulated`.
     not_emulated : str
@@ -300,6 +302,7 @@ class Certificate:
     setpoint_in_cascade: PathComparison | None = None
     kick_in_cascade: Kick | None = None
     compensated: bool = False
+    shifts_for_good: bool = False
     scan_by_scan: ScanByScan | None = None
     not_emulated: str = ""
     scan_cost: ScanCost | None = None
@@ -341,7 +344,8 @@ class Certificate:
         contradicted = emulated is not None and emulated.same_rules and not emulated.is_exact_on_measurement
         slow = self.scan_cost is not None and self.scan_cost.matters and not self.compensated
         coarse = self.rounding is not None and self.rounding > COARSE
-        if self.is_bent or contradicted or slow or coarse or not (self.feedback_before_rounding or self.headline).is_exact:
+        moved = self.is_bent or contradicted or slow or coarse or self.shifts_for_good
+        if moved or not (self.feedback_before_rounding or self.headline).is_exact:
             return "approximate"
         path = self.setpoint_before_rounding or self.setpoint_headline
         if mode == "cascade" and self.setpoint_in_cascade is not None:

@@ -21,7 +21,7 @@ from pidemu.certificate.figures import (
     textbook_line,
     unit_of,
 )
-from pidemu.certificate.models import Certificate, LoopComparison
+from pidemu.certificate.models import EXACT, Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
@@ -58,7 +58,8 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     for name, value in nearest.settings.items():
         if value.active:
             click.echo(f"  {name} = {number(value.value)} {unit_of(value)}".rstrip(), err=True)
-    click.echo(f"their cost: up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band", err=True)
+    cost = f"up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)}" if band.max_deviation >= EXACT else "none"
+    click.echo(f"their cost in the loop band: {cost}", err=True)
 
 
 def print_conversion(c: Conversion) -> None:

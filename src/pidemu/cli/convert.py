@@ -176,14 +176,7 @@ def command(
         source = _only_reading(word, {**given, **ranges}, goal, arguments, target, vendors, as_json)
     else:
         source = load_card(card or "", vendors).settings({**given, **ranges})
-    try:
-        conversion = convert(source, goal, **arguments)
-    except QuestionError as error:
-        print_questions(error, source, goal.id, as_json)
-        raise SystemExit(1) from None
-    except ConversionRefusedError as error:
-        print_refusal(error, source, goal, as_json)
-        raise SystemExit(1) from None
+    conversion = _converted(source, goal, arguments, as_json)
     plan, not_known = _plan(conversion, now)
     if page is not None:
         from pidemu.report.certificate import write_page
@@ -192,16 +185,31 @@ def command(
     if as_json:
         print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
     else:
-        print_conversion(conversion)
-        if plan is not None:
-            print_plan(plan)
-        if explain:
-            print_explanation(conversion)
-        if page is not None:
-            click.echo(f"\nwritten: {page}")
+        _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:
         click.echo(f"error: {not_known}", err=True)
         raise SystemExit(1)
+
+
+def _converted(source: Settings, goal: Card, arguments: dict[str, Any], as_json: bool) -> Conversion:
+    """Return the conversion; a question or a refusal is printed, and ends the command."""
+    try:
+        return convert(source, goal, **arguments)
+    except QuestionError as error:
+        print_questions(error, source, goal.id, as_json)
+    except ConversionRefusedError as error:
+        print_refusal(error, source, goal, as_json)
+    raise SystemExit(1)
+
+
+def _print(conversion: Conversion, plan: TransferPlan | None, *, explain: bool, page: str | None) -> None:
+    print_conversion(conversion)
+    if plan is not None:
+        print_plan(plan)
+    if explain:
+        print_explanation(conversion)
+    if page is not None:
+        click.echo(f"\nwritten: {page}")
 
 
 def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:

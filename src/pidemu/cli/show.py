@@ -19,7 +19,7 @@ from pidemu.card.models import Example, Setting
 from pidemu.card.references import is_active
 from pidemu.card.text import equation_heading, equation_lines
 from pidemu.cli.common import (
-    Pair,
+    Range,
     Time,
     assignments,
     heading,
@@ -36,7 +36,8 @@ from pidemu.explanation.explain import explain
 from pidemu.explanation.model import Explanation
 from pidemu.explanation.text import sections, table_lines
 from pidemu.plain import json_safe
-from pidemu.settings import RESERVED, off_values
+from pidemu.ranges import RANGES, SignalRange
+from pidemu.settings import off_values
 
 _WIDTH: Final = 110
 _LEAST: Final = 36
@@ -48,16 +49,16 @@ _COLOUR: Final = {"assumed": "yellow", "inferred": "cyan", "documented": "green"
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
 @click.option("--scan", type=Time(), help="Scan interval [s]: kicks and noise gain at it, too.")
-@click.option("--pv-range", type=Pair(), help="Range of the measurement [engineering units].")
-@click.option("--op-range", type=Pair(), help="Range of the output [engineering units].")
+@click.option("--pv-range", type=Range(), help='Range of the measurement, such as "0,400 degC".')
+@click.option("--op-range", type=Range(), help='Range of the output, such as "0,100 %".')
 @vendors_option
 @json_option
 def command(
     card: str,
     values: tuple[str, ...],
     scan: float | None,
-    pv_range: tuple[float, float] | None,
-    op_range: tuple[float, float] | None,
+    pv_range: SignalRange | None,
+    op_range: SignalRange | None,
     vendors: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -101,7 +102,7 @@ def command(
 def _refuse_unknown(card: Card, dials: Mapping[str, object]) -> None:
     """Refuse names that are neither settings nor options, since what is shown depends on which they are."""
     known = [*card.all_settings(), *card.options]
-    folded = {name.casefold() for name in (*known, *RESERVED)}
+    folded = {name.casefold() for name in (*known, *RANGES)}
     wrong = [name for name in dials if name.casefold() not in folded]
     if wrong:
         which = ", ".join(f"'{name}'{suggest(name, known)}" for name in wrong)

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 
 from pidemu.action import switch_position
 from pidemu.card.base import Form
-from pidemu.card.library import load_card
+from pidemu.card.library import cards, load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
+from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
 from pidemu.conversion.asking import action_questions, ask, missing_ranges, mode_is_open, mode_question, scale_questions
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.merit import forgets
 from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
@@ -165,12 +167,38 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
         if settings is None:
             raise ConversionRefusedError(refusal)
     ask(missing_ranges(source, settings), source, card, request)
+    shift = "" if refusal else _forgetting(source, settings, request, work.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
+    if shift:
+        conversion = replace(conversion, refusal=shift, certificate=replace(conversion.certificate, shifts_for_good=True))
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if conversion.refusal and not request.allow_approximate:
-        raise ConversionRefusedError(conversion.refusal, conversion)
+        raise ConversionRefusedError(conversion.refusal, conversion, _that_hold(settings) if shift else ())
     return conversion
+
+
+def _forgetting(source: Settings, settings: Settings, request: Request, factor: float) -> str:
+    """Return why a target cannot hold what the source held at a limit; empty where it can, or where an integral makes up for it."""
+    if not forgets(source, settings):
+        return ""
+    from pidemu.certificate.limit_shift import limit_shift
+
+    scans = request.scan or (common_interval(source, settings),) * 2
+    shift = limit_shift(source, settings, scans, factor)
+    return f"{settings.card.id} cannot hold the output of a loop without integral action. {shift.text}" if shift.refuses else ""
+
+
+def _that_hold(settings: Settings) -> tuple[str, ...]:
+    """Return what can hold the output of a loop without integral action."""
+    from pidemu.certificate.limit_shift import choices_that_hold
+
+    choices = choices_that_hold(settings.card, settings.options)
+    options = [f"--set {n}={x} makes {settings.card.id} positional" for choice in choices for n, x in choice.items()]
+    vendor = settings.card.id.partition("/")[0]
+    blocks = [i for i in cards() if i.startswith(f"{vendor}/") and load_card(i).data.implementation == "positional"]
+    named = f", such as {' or '.join(blocks)}" if blocks else ""
+    return (*options, f"a positional block with a bias holds the output{named}; set the bias to the output at SP = PV")
 
 
 def _concluded(

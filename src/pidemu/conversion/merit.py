@@ -49,6 +49,8 @@ class Merit:
         How far the terms that see the setpoint are from the source's, in the worst mode: see `setpoint_class`.
     nonlinear : bool
         Whether what is not linear, such as a squared error, differs.
+    forgets : bool
+        Whether the target has no integral action and forgets at a limit where it was, which the source does not.
     noisy : bool
         Whether noise is more than 1.5 times the source's without the law being the same.
     verdict : int
@@ -80,6 +82,7 @@ class Merit:
     unused: int = 0
     setpoint: int = 0
     nonlinear: bool = False
+    forgets: bool = False
     noisy: bool = False
     verdict: int = 0
     form: int = 0
@@ -108,6 +111,7 @@ _WORDS: Final = {
     "unused": "a dial that was given is not in use",
     "setpoint": "other terms see the setpoint",
     "nonlinear": "a nonlinear option differs",
+    "forgets": "forgets at a limit where it was",
     "noisy": "much more noise on the output",
     "verdict": "farther from the source",
     "form": "another form than the source's",
@@ -146,6 +150,7 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         unused=unused,
         setpoint=max(setpoint_class(in_mode(a, m), in_mode(b, m)) for m in modes),
         nonlinear=a.beyond_the_law != b.beyond_the_law,
+        forgets=forgets(source, settings),
         noisy=not exact and ratio > _NOISY,
         verdict=_class(work, certificate),
         form=0
@@ -162,6 +167,12 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         units=_other_units(source, settings),
         changed=changed,
     )
+
+
+def forgets(source: Settings, target: Settings) -> bool:
+    """Whether a source that holds its output by a bias meets a target that counts from its last output, without integral action."""
+    a, b = source.algorithm(), target.algorithm()
+    return not (a.ki or b.ki or a.velocity) and b.velocity
 
 
 def setpoint_class(source: Algorithm, target: Algorithm) -> int:

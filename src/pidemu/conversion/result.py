@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pidemu.action import action_words, carried_action
+from pidemu.action import action_line, action_words, carried_action
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
@@ -142,11 +142,11 @@ class Conversion:
         """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
         from pidemu.cutover.bench_check import bench_check
 
-        lines = [f"action: {self.action_text}"]
+        lines = [f"Action: {self.action_text}." + self._old_action()]
         try:
-            lines.append(f"bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
+            lines.append(f"Bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
         except ScanError as error:
-            lines.append(f"no bench check: {error}")
+            lines.append(f"No bench check: {error}.")
         return tuple(lines)
 
     @cached_property
@@ -170,6 +170,14 @@ class Conversion:
         known = self.action
         both: tuple[Action, ...] = ("reverse", "direct") if known is None else (known,)
         return "; ".join(self._action_words(a) for a in both)
+
+    def _old_action(self) -> str:
+        """Return what the action is called on the source, where that is another word."""
+        old, new = self.source.equation.action, self.settings.equation.action
+        same = {k: v.casefold() for k, v in old.names.items()} == {k: v.casefold() for k, v in new.names.items()}
+        if same and self.factor > 0 and old.fixed == new.fixed:
+            return ""
+        return f" On {self.source.card.id} it is {action_line(self.source, self.action)}."
 
     def _action_words(self, action: Action) -> str:
         carried = carried_action(self.settings)
