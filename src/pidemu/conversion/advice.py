@@ -98,7 +98,7 @@ def _scan(c: Conversion) -> Iterator[str]:
         yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
     if c.scan[0] != c.scan[1]:
         yield (
-            f"The scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: the settings are per second, so do not scale the gain "
+            f"The scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: settings are per second, so do not scale the gain "
             "by their ratio"
         )
     if c.request.compensate:
