@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.algorithm import Algorithm
@@ -34,7 +34,7 @@ class Value:
     unit : str
         The card's unit.
     spans : Spans
-        Signal spans, for gains in engineering units.
+        Signal spans and, where dials of the card count in scans, the scan interval.
     given : bool
         Whether the user gave it; otherwise it is the card's default.
     active : bool
@@ -116,6 +116,8 @@ class Settings(Mapping[str, Value]):
         What was inferred or converted on the way in.
     defaulted : tuple of str
         Options that nobody chose, so that the card's default was taken.
+    scan : float or None
+        Scan interval at which dials that count in scans are read [s]; ``None``: the card's, or no dial does.
     """
 
     variant: Variant
@@ -124,6 +126,7 @@ class Settings(Mapping[str, Value]):
     op_range: tuple[float, float] | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
+    scan: float | None = field(default=None, compare=False)
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
@@ -166,7 +169,19 @@ class Settings(Mapping[str, Value]):
     @property
     def spans(self) -> Spans:
         """Signal spans; 100 where no range was given."""
-        return spans_of(self.pv_range, self.op_range)
+        return spans_of(self.pv_range, self.op_range, self.scan)
+
+    @property
+    def counts_scans(self) -> bool:
+        """Whether a dial counts in scans, so that the algorithm's numbers depend on the scan interval."""
+        return any(parse_unit(v.unit).scans for v in self.values())
+
+    def at_scan(self, scan: float | None) -> Settings:
+        """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none."""
+        if scan is None or not self.counts_scans:
+            return self
+        values = {name: replace(v, spans=replace(v.spans, scan=scan)) for name, v in self.items()}
+        return replace(self, values_by_name=values, scan=scan)
 
     def by_role(self, role: Role) -> Value | None:
         """Return the active dial that sets `role`, or ``None``."""
@@ -204,7 +219,7 @@ class Settings(Mapping[str, Value]):
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
-        return self.card.settings({**given, **values})
+        return self.card.settings({**given, **values}).at_scan(self.scan)
 
     def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.
@@ -215,7 +230,8 @@ class Settings(Mapping[str, Value]):
             For a card that computes in engineering units: leave the gains in those units, as the scan program needs them,
             instead of percent of span.
         scan : float, optional
-            Scan interval, for filters that are set as a share per scan [s]; by default the card's.
+            Scan interval, for dials that count in scans and filters that are set as a share per scan [s]; by default that of
+            the settings, or the card's.
 
         Raises
         ------
@@ -226,7 +242,9 @@ class Settings(Mapping[str, Value]):
 
         equation = self.equation
         filtered = (equation.setpoint, equation.measurement, equation.error) != (None, None, None)
-        key = (own_units and equation.signals == "engineering", scan if filtered else None)  # what makes a difference
+        scan = self.scan if scan is None else scan
+        timed = filtered or self.counts_scans
+        key = (own_units and equation.signals == "engineering", scan if timed else None)  # what makes a difference
         if key not in self._algorithms:
             self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan)
         return self._algorithms[key]
@@ -262,6 +280,6 @@ class Settings(Mapping[str, Value]):
         return Law(self.algorithm(scan=scan), scan)
 
 
-def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
-    """Return the spans of signal ranges; 100 where none is given."""
-    return Spans(pv[1] - pv[0] if pv else 100.0, op[1] - op[0] if op else 100.0)
+def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None, scan: float | None = None) -> Spans:
+    """Return the spans of signal ranges, 100 where none is given, with the scan interval [s]."""
+    return Spans(pv[1] - pv[0] if pv else 100.0, op[1] - op[0] if op else 100.0, scan)

@@ -149,7 +149,12 @@ def test_the_csv_holds_every_cell_with_its_figures(four: Matrix) -> None:
 
 
 def test_a_target_that_refuses_shows_its_nearest_settings(tmp_path: Path) -> None:
-    text = edited(VALID, ('GAIN: {sets: gain, unit: "%/%"}', 'GAIN: {sets: gain, unit: "%/%", range: [3, 9]}'))
+    text = edited(
+        VALID,
+        ('GAIN: {sets: gain, unit: "%/%"}', 'GAIN: {sets: gain, unit: "%/%", range: [3, 9]}'),
+        ("GAIN: 2,", "GAIN: 4,"),
+        ("kp: 2, ki: 0.0333333, kd: 32", "kp: 4, ki: 0.0666667, kd: 64"),
+    )
     cell = matrix(["generic/standard", written(tmp_path, text)], emulate=False).row("generic/standard")[1]
     assert (cell.verdict, cell.mark) == ("refused", "x")
     assert "GAIN" in cell.sentence

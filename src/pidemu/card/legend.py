@@ -155,6 +155,8 @@ def _of_derivative(q: Equation, filt: Filter) -> str:
     time = "Td"
     if filt.of == "effective-derivative":
         time = "Ti Td/(Ti + Td)" if q.integral.on != "none" else "Td"
+    elif filt.of == "derivative-time":
+        return f"{short(filt.ratio)} x kd/kp" if filt.ratio is not None else f"kd/(kp {short(filt.gain)})"
     elif q.form is Form.PARALLEL:
         time = next((name for name, s in q.settings.items() if s.sets == "derivative"), "kd")
     return f"{short(filt.ratio)} x {time}" if filt.ratio is not None else f"{time} / {short(filt.gain)}"
@@ -181,11 +183,13 @@ def _canonical(q: Equation, role: str, name: str, unit: str) -> str:
     """Return a dial's canonical quantity as a formula."""
     dimension = _dimension(unit)
     if role == "gain":
+        own = q.signals == "engineering"
+        span = "OP span" if own else "PV span"
         return {
             Dimension.PERCENT: f"100/{name}",
-            Dimension.PV_UNITS: f"PV span/{name}",
-            Dimension.OP_PER_PV: name if q.signals == "engineering" else f"{name} x PV span/OP span",
-            Dimension.PERCENT_PER_PV: f"{name} x PV span/100",
+            Dimension.PV_UNITS: f"{span}/{name}",
+            Dimension.OP_PER_PV: name if own else f"{name} x PV span/OP span",
+            Dimension.PERCENT_PER_PV: f"{name} x {span}/100",
         }.get(dimension or Dimension.RATIO, name)
     inverse = role == "integral" and (dimension in _TIMES) == (q.form is Form.PARALLEL)
     return f"1/{name}" if inverse else name

@@ -161,7 +161,7 @@ def _wrong_tracking(w: WindupBackCalculation, equation: Equation) -> Iterator[st
     elif isinstance(given, float) and w.when_off is not None:
         yield "'when-off' goes with a setting under 'tracking-time'"
     setting = equation.settings.get(given) if isinstance(given, str) else None
-    if setting is None or setting.sets != "tracking-time" or setting.unit not in ("1", "s", "min", "h", "ms"):
+    if setting is None or setting.sets != "tracking-time" or setting.unit not in ("1", "s", "min", "h", "ms", "scan"):
         return
     ratio = parse_unit(setting.unit).dimension is Dimension.RATIO
     if ratio and w.times is None:

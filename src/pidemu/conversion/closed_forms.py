@@ -221,7 +221,8 @@ class ClosedForms:
         _, m1, m2 = closed.without_rounding(moments)
         if m2 == 0:
             return 0.0, 0.0
-        plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"
+        filt = self.target.filter
+        plain = self.target.form is Form.PARALLEL and filt.kind != "time" and filt.of != "derivative-time"
         per = 1.0 if plain else m1 or self.target.idle_gain
         return max(0.0, -m3 / m2), m2 / per
 

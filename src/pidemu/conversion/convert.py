@@ -112,6 +112,7 @@ def convert(
     _refuse_absurd_gains(source)
     request = read_request(card, options, given, scan, match, pv_range, op_range)
     request = replace(request, process=process, compensate=compensate, allow_approximate=allow_approximate, round_dials=round_dials)
+    source = source.at_scan(request.scan[0] if request.scan else None)
     factor = _rescaling(source, request)
     taken = {**(source.options if source.card.id == card.id else {}), **request.options}
     fixed = {**_shared(source, card), **request.given}
@@ -119,7 +120,8 @@ def convert(
         source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
     def solver(named: Mapping[str, object]) -> Solver:
-        goal = Target(card, named, fixed, request.pv_range or source.pv_range, request.op_range or source.op_range)
+        ranges = (request.pv_range or source.pv_range, request.op_range or source.op_range)
+        goal = Target(card, named, fixed, *ranges, request.scan[1] if request.scan else None)
         goal.reject_missing()
         sign = -1 if _is_negative(source, goal) else 1
         return Solver(source, goal, sign * factor, request.scan, process, compensate=compensate)

@@ -75,7 +75,8 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     except UndefinedError:
         raise NoMatchError("the source has more filters than the target") from None
     shape, filt = target.shape, target.filter
-    by_multiplier = target.form is Form.PARALLEL and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
+    of_dial = target.form is Form.PARALLEL and filt.of != "derivative-time"
+    by_multiplier = of_dial and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
     if not filt.free and not by_multiplier:
         raise NoMatchError("the target's filter is fixed")
     if filt.needed and n2 and not d1:
@@ -236,7 +237,8 @@ def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: Target
     if filt.kind == "time":
         Tf = filt.time
         return _through_signal_filter(m0, m1 + m0 * Tf, m2 + m1 * Tf + m0 * Tf * Tf * (1 - second), Tf, target)
-    if target.form is Form.PARALLEL or (target.form is Form.SERIES and not filt.effective):
+    known = {Form.STANDARD: True, Form.PARALLEL: filt.of == "derivative-time", Form.SERIES: filt.of == "effective-derivative"}
+    if not known.get(target.form):
         raise NoMatchError("there is no closed form for this filter")
     rho = filt.ratio
     # Tf = rho Td:  m0 rho (1 - (1 - second) rho) Td^2 + m1 (1 - rho) Td - m2 = 0
