@@ -180,9 +180,9 @@ def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: floa
     """
     if filt.of == "effective-derivative":
         return time / (1 + rate * time)
-    if filt.of == "derivative" or not kd:
+    if filt.of == "derivative" or not kd or read.settings.equation.form is not Form.PARALLEL:
         return time
-    if kd / kp <= 0 if kp else True:
+    if not kp or kd / kp <= 0:
         raise UndefinedError(
             f"{read.settings.card.id}: the derivative's filter goes with kd/kp, the derivative time, which a proportional gain of "
             f"{kp:g} with a derivative gain of {kd:g} does not have; give a proportional gain of the same sign, or switch the filter off"

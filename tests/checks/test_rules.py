@@ -371,11 +371,6 @@ EQUATIONS: tuple[Case, ...] = (
     ),
     (
         "reject_bad_filter",
-        (("ratio: ALPHA", "ratio: ALPHA, of: derivative-time"),),
-        ("11:67: 'derivative-time' is kd/kp of a parallel form; here the derivative dial is one: remove it",),
-    ),
-    (
-        "reject_bad_filter",
         (
             ("ratio: ALPHA", "ratio: ALPHA, of: effective-derivative"),
             ("form: standard", "form: parallel"),

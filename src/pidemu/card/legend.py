@@ -155,7 +155,7 @@ def _of_derivative(q: Equation, filt: Filter) -> str:
     time = "Td"
     if filt.of == "effective-derivative":
         time = "Ti Td/(Ti + Td)" if q.integral.on != "none" else "Td"
-    elif filt.of == "derivative-time":
+    elif filt.of == "derivative-time" and q.form is Form.PARALLEL:
         return f"{short(filt.ratio)} x kd/kp" if filt.ratio is not None else f"kd/(kp {short(filt.gain)})"
     elif q.form is Form.PARALLEL:
         time = next((name for name, s in q.settings.items() if s.sets == "derivative"), "kd")

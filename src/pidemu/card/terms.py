@@ -129,9 +129,9 @@ class Filter(Model):
     time: SettingName | Number | None = Field(default=None, description="`Tf` itself: seconds, or the name of a setting.")
     of: Literal["derivative", "derivative-time", "effective-derivative"] = Field(
         default="derivative",
-        description="The time that `ratio` or `gain` refers to: the derivative setting; in the parallel form `derivative-time`, "
-        "`kd/kp`, so that the filter time is `kd/(kp N)`; in the others `effective-derivative`, `Ti Td/(Ti + Td)`, the derivative "
-        "time of the equivalent standard form.",
+        description="The time that `ratio` or `gain` refers to. `derivative`: the derivative setting. `derivative-time`: `Td`, which "
+        "is `kd/kp` in the parallel form, so that the filter time there is `kd/(kp N)`. `effective-derivative`: `Ti Td/(Ti + Td)`, "
+        "the derivative time of the equivalent standard form.",
     )
     rule: GeneralRule | None = Field(
         default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."

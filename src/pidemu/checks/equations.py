@@ -227,8 +227,6 @@ def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
     if filt.of != "derivative" and filt.time is not None:
         yield document.problem(home, "'of' refers to ratio or gain, not to time", at_key=True)
     parallel = equation.form == "parallel"
-    if filt.of == "derivative-time" and not parallel:
-        yield document.problem((*home, "of"), "'derivative-time' is kd/kp of a parallel form; here the derivative dial is one: remove it")
     if filt.of == "derivative-time" and parallel and equation.proportional.on == "none":
         yield document.problem((*home, "of"), "'derivative-time' is kd/kp, and this card has no proportional term")
     if filt.of == "effective-derivative" and parallel and equation.derivative.on != "none":

@@ -51,6 +51,8 @@ def check_terms(source: Algorithm, target: Target) -> None:
         raise NoMatchError(f"the source has proportional action, {have} has none")
     if not source.kp and target.has_proportional and target.form is not Form.PARALLEL:
         raise NoMatchError(f"the source has no proportional action; the {target.form.value} form of {have} cannot be without it")
+    if source.kd and not source.kp and target.has_proportional and target.filter.of == "derivative-time":
+        raise NoMatchError(f"the source has no proportional action; the derivative's filter of {have} goes with kd/kp")
 
 
 def _chosen(target: Target) -> str:
