@@ -120,12 +120,32 @@ def test_a_conversion_reads_times_in_scans_at_the_scan_that_is_given(tmp_path: P
     s = bench.settings(GAIN=2, RESET=40)
     plain = pidemu.convert(s, "generic/standard", emulate=False)
     assert plain.settings["Ti"].value == pytest.approx(20, rel=EXACT)  # the card's 0.5 s
+    said = "nobody/bench: RESET in scans: taken at 0.5 s, the card's interval; give the real one, --scan"
+    assert said in plain.warnings
     at_two = pidemu.convert(s, "generic/standard", scan=2.0)
     assert at_two.settings["Ti"].value == pytest.approx(80, rel=EXACT)
     assert at_two.verdict == "exact"
     back = pidemu.convert(at_two.settings, bench, options={"STRUCTURE": "PID"}, scan=(2.0, 2.0))
     assert back.settings["RESET"].value == pytest.approx(40, rel=EXACT)
     assert back.verdict == "exact"
+    assert said not in (*at_two.warnings, *back.warnings)
+
+
+def test_two_controllers_that_count_in_scans_are_asked_for_both_intervals(tmp_path: Path) -> None:
+    one = pidemu.load_card(written(tmp_path / "1", edited(VALID, *SCANS)))
+    slower = (*SCANS[:2], ("scan: {default: 1 s}", "scan: {default: 2 s}"), SCANS[3])
+    other = pidemu.load_card(written(tmp_path / "2", edited(VALID, *slower)))
+    with pytest.raises(SettingError, match="dials of nobody/bench and of nobody/bench count in scans; give both scan intervals"):
+        pidemu.convert(one.settings(GAIN=2, RESET=40), other)
+    conversion = pidemu.convert(one.settings(GAIN=2, RESET=40), other, scan=(0.5, 2.0), compensate=False)
+    assert conversion.settings["RESET"].value == pytest.approx(10, rel=EXACT)
+
+
+def test_the_emulation_reads_scans_as_the_law_does_where_no_interval_is_given(tmp_path: Path) -> None:
+    bench = pidemu.load_card(written(tmp_path, edited(VALID, *SCANS)))
+    conversion = pidemu.convert(bench.settings(GAIN=2, RESET=400, RATE=20), "generic/standard")
+    assert conversion.certificate.scan_by_scan is not None
+    assert conversion.verdict in ("exact", "exact-feedback")
 
 
 @pytest.mark.parametrize(("dial", "given"), [("RESET", "20 s"), ("RATE", "1 min")])

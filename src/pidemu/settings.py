@@ -117,7 +117,7 @@ class Settings(Mapping[str, Value]):
     defaulted : tuple of str
         Options that nobody chose, so that the card's default was taken.
     scan : float or None
-        Scan interval at which dials that count in scans are read [s]; ``None``: the card's, or no dial does.
+        Scan interval at which dials that count in scans are read [s], the card's unless stated; ``None`` where it has none.
     """
 
     variant: Variant
@@ -173,12 +173,12 @@ class Settings(Mapping[str, Value]):
 
     @property
     def counts_scans(self) -> bool:
-        """Whether a dial counts in scans, so that the algorithm's numbers depend on the scan interval."""
-        return any(parse_unit(v.unit).scans for v in self.values())
+        """Whether a dial at work counts in scans, so that the algorithm's numbers depend on the scan interval."""
+        return any(parse_unit(v.unit).scans and v.active and not v.off for v in self.values())
 
     def at_scan(self, scan: float | None) -> Settings:
         """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none."""
-        if scan is None or not self.counts_scans:
+        if scan is None or self.scan is None:
             return self
         values = {name: replace(v, spans=replace(v.spans, scan=scan)) for name, v in self.items()}
         return replace(self, values_by_name=values, scan=scan)

@@ -137,7 +137,7 @@ def _notes(made: Trial, action: Action | None, margins: LoopFigures | None) -> I
         yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
     if margins is None:
         yield "the feedback is positive, so that the loop has no margins; leave --action out, or give the gain the other sign"
-    for what in made.settings.algorithm().too_coarse(made.scan):
+    for what in made.settings.algorithm(scan=made.scan).too_coarse(made.scan):
         yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
 
 

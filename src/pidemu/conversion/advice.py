@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from pidemu.settings import Settings
-from pidemu.units import Role
+from pidemu.units import Role, parse_unit
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -27,6 +27,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     if c.refusal:
         yield f"these are only the nearest settings: {c.refusal}"
     yield from _ranges(c)
+    yield from _counted_in_scans(c)
     yield from _setpoint(c)
     yield from _multiplier(c)
     yield from _noise(c)
@@ -60,6 +61,14 @@ def _ranges(c: Conversion) -> Iterator[str]:
                 f"{s.card.id} computes in engineering units, and not all ranges were given: spans not given are taken as 100; "
                 "give the ranges of measurement and output"
             )
+
+
+def _counted_in_scans(c: Conversion) -> Iterator[str]:
+    """Yield which dials rest on a scan interval that was not given."""
+    for s in (c.source, c.settings):
+        counted = [n for n, v in s.items() if v.active and not v.off and parse_unit(v.unit).scans]
+        if counted and c.request.scan is None:
+            yield f"{s.card.id}: {', '.join(counted)} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:

@@ -135,6 +135,7 @@ def convert(
             raise ConversionRefusedError(refusal)
     work = best.solver
     assert work is not None  # there are settings
+    _refuse_two_intervals(source, settings, request)
     before = settings
     settings, dials = rounded(settings) if round_dials else (settings, ())
     certificate = full_certificate(work, settings, work.scan_cost(before, best.match), emulate=emulate)
@@ -209,6 +210,13 @@ def _refuse_absurd_gains(source: Settings) -> None:
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
             raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
+
+
+def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:
+    """Refuse to guess two scan intervals, where dials of both controllers count in scans."""
+    both = source.counts_scans and settings.counts_scans
+    if request.scan is None and both and source.scan != settings.scan:
+        raise SettingError(f"dials of {source.card.id} and of {settings.card.id} count in scans; give both scan intervals, --scan H,H2")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
