@@ -301,10 +301,13 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
     cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
+    rate = math.inf if sp is None else read.pick(sp.rate, math.inf)
     other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
     return {
         "sp_filter": _lag(read, sp, h),
-        "sp_rate": math.inf if sp is None else read.pick(sp.rate, math.inf),
+        "sp_rate": rate,
+        "sp_rate_down": rate if sp is None or sp.rate_down is None else read.pick(sp.rate_down, math.inf),
+        "sp_rate_local": sp is not None and sp.rate_counts == "local",
         "sp_from_zero": sp is not None and sp.starts == "zero",
         "sp_tracks": sp is not None and sp.tracks,
         "pv_filter": _lag(read, pv, h),

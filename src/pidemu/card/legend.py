@@ -90,8 +90,13 @@ def _setpoint(q: Equation) -> Iterator[str]:
         yield f"SPf = {limited}/(1 + Tsp s)"
         yield from _lag_time(q, "Tsp", sp.filter)
     if sp.rate is not None:
-        at_most = f"{named(q, sp.rate)}{'' if isinstance(sp.rate, str) else ' per s'}"
-        yield f"{'SPf' if sp.filter is None else 'SPr'} = SP, changing by at most {at_most}"
+        down = "" if sp.rate_down is None else f" upwards, {_per_second(q, sp.rate_down)} downwards"
+        local = "; a remote setpoint is not limited" if sp.rate_counts == "local" else ""
+        yield f"{'SPf' if sp.filter is None else 'SPr'} = SP, changing by at most {_per_second(q, sp.rate)}{down}{local}"
+
+
+def _per_second(q: Equation, given: str | float) -> str:
+    return f"{named(q, given)}{'' if isinstance(given, str) else ' per s'}"
 
 
 def _measurement(q: Equation) -> Iterator[str]:

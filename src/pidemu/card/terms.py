@@ -63,6 +63,12 @@ class Setpoint(Model):
         description="Fastest change of the setpoint that the algorithm sees [as the measurement, per second]: a "
         "number, or the name of a setting.",
     )
+    rate_down: Reference | None = Field(
+        default=None, description="Fastest fall of the setpoint, where that is another; `rate` is then the fastest rise."
+    )
+    rate_counts: Literal["always", "local"] = Field(
+        default="always", description="Whether the rates limit a remote setpoint too, in cascade, or the local one only."
+    )
     starts: Literal["setpoint", "zero"] = Field(
         default="setpoint", description="Where the limited setpoint starts at power-up: at the setpoint, or at zero."
     )

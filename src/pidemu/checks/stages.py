@@ -37,12 +37,15 @@ def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_setpoint(variant: Variant) -> Iterator[Problem]:
-    """Only a limited setpoint starts somewhere else than at the setpoint."""
+    """Only a limited setpoint starts somewhere else than at the setpoint, falls at a rate of its own or is limited in some modes."""
     setpoint = variant.equation.setpoint
     if setpoint is not None and setpoint.starts == "zero" and setpoint.rate is None:
         yield variant.card.document.problem(
             variant.home(("setpoint", "starts")), "'starts: zero' belongs to a setpoint with a 'rate'"
         )
+    if setpoint is not None and setpoint.rate is None and (setpoint.rate_down is not None or setpoint.rate_counts != "always"):
+        message = "'rate-down' and 'rate-counts' belong to a setpoint with a 'rate'"
+        yield variant.card.document.problem(variant.home(("setpoint",)), message, at_key=True)
 
 
 def reject_bad_error(variant: Variant) -> Iterator[Problem]:
