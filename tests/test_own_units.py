@@ -158,5 +158,3 @@ def test_seconds_for_a_dial_in_scans_are_refused_as_the_interval_is_not_known(di
 def test_scans_for_a_dial_in_seconds_are_refused_as_the_interval_is_not_known() -> None:
     with pytest.raises(SettingError, match="'20 scans' counts in scans, this dial is in s"):
         pidemu.load_card("generic/standard").settings(K=2, Ti="20 scans")
-
-

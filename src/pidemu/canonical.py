@@ -146,9 +146,7 @@ def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
     return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
 
 
-def _filter(
-    read: _Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float
-) -> tuple[float, Place, Any]:
+def _filter(read: _Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
     """Return the filter's time [s], place and order (specs/equations.md, section 1)."""
     if filt is None:
         return 0.0, "term", 1
@@ -184,8 +182,8 @@ def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: floa
         return time
     if not kp or kd / kp <= 0:
         raise UndefinedError(
-            f"{read.settings.card.id}: the derivative's filter goes with kd/kp, the derivative time, which a proportional gain of "
-            f"{kp:g} with a derivative gain of {kd:g} does not have; give a proportional gain of the same sign, or switch the filter off"
+            f"{read.settings.card.id}: the derivative's filter goes with the derivative time kd/kp, and kp is {kp:g} with kd "
+            f"{kd:g}; give a proportional gain of the same sign, or switch the filter off"
         )
     return kd / kp
 

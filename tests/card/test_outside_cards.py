@@ -9,7 +9,7 @@ import pytest
 import pidemu
 from pidemu import checks
 from pidemu.card.library import ENVIRONMENT, builtin_folder
-from pidemu.errors import CardError
+from pidemu.errors import CardError, Problem
 from tests.checks.bench import VALID, added, edited, written
 from tests.cli.helpers import said, told
 
@@ -74,7 +74,12 @@ def test_check_and_the_list_of_cards_go_on_with_a_wrong_card(wrong: Path) -> Non
 def test_a_card_is_checked_once_as_long_as_its_file_does_not_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[str] = []
     check = checks.check
-    monkeypatch.setattr(checks, "check", lambda card: seen.append(card.id) or check(card))
+
+    def counted(card: pidemu.Card) -> list[Problem]:
+        seen.append(card.id)
+        return check(card)
+
+    monkeypatch.setattr(checks, "check", counted)
     good, bad = written(tmp_path, VALID), written(tmp_path / "other", WRONG)
     for _ in range(3):
         pidemu.load_card(good)

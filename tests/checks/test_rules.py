@@ -141,7 +141,7 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_units",
         (*_ENGINEERING, ('unit: "%/%"', "unit: eu"), ("limits: [0, 100]", "limits: [0, inf]")),
-        ("15:28: 'eu' refers to the output's range, and 'output.limits' is infinite; give its limits, or a gain in 'eu/eu'",),
+        ("15:28: 'eu' refers to the output's range, and 'output.limits' is infinite; give limits, or a gain in 'eu/eu'",),
     ),
     (
         "reject_bad_units",

@@ -225,6 +225,11 @@ def test_an_interrupt_ends_all_processes_without_a_traceback(tmp_path: Path) -> 
 
 
 def test_typical_times_of_a_card_that_counts_in_scans_are_those_seconds(tmp_path: Path) -> None:
-    text = edited(VALID, ("integral, unit: s,", "integral, unit: scan,"), ("scan: {default: 1 s}", "scan: {default: 0.5 s}"), ("RESET: 60", "RESET: 120"))
+    text = edited(
+        VALID,
+        ("integral, unit: s,", "integral, unit: scan,"),
+        ("scan: {default: 1 s}", "scan: {default: 0.5 s}"),
+        ("RESET: 60", "RESET: 120"),
+    )
     settings = typical_settings(pidemu.load_card(written(tmp_path, text)))
     assert settings["RESET"].value == 180  # 90 s

@@ -135,9 +135,9 @@ class Filter(Model):
     time: SettingName | Number | None = Field(default=None, description="`Tf` itself: seconds, or the name of a setting.")
     of: Literal["derivative", "derivative-time", "effective-derivative"] = Field(
         default="derivative",
-        description="The time that `ratio` or `gain` refers to. `derivative`: the derivative setting. `derivative-time`: `Td`, which "
-        "is `kd/kp` in the parallel form, so that the filter time there is `kd/(kp N)`. `effective-derivative`: `Ti Td/(Ti + Td)`, "
-        "the derivative time of the equivalent standard form.",
+        description="The time that `ratio` or `gain` refers to. `derivative`: the derivative setting. `derivative-time`: `Td`, "
+        "which is `kd/kp` in the parallel form, so that the filter time there is `kd/(kp N)`. `effective-derivative`: "
+        "`Ti Td/(Ti + Td)`, the derivative time of the equivalent standard form.",
     )
     rule: GeneralRule | None = Field(
         default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."

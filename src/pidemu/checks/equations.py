@@ -59,7 +59,9 @@ def reject_bad_units(variant: Variant) -> Iterator[Problem]:
         if unit.name != setting.unit:
             yield variant.card.document.problem(home, f"write the unit '{unit.name}'")
         if variant.equation.signals == "engineering":
-            yield from (variant.card.document.problem(home, m) for m in _wrong_in_own_units(variant.equation, Role(setting.sets), unit))
+            yield from (
+                variant.card.document.problem(home, m) for m in _wrong_in_own_units(variant.equation, Role(setting.sets), unit)
+            )
 
 
 def _wrong_in_own_units(equation: Equation, role: Role, unit: Unit) -> Iterator[str]:
@@ -71,7 +73,7 @@ def _wrong_in_own_units(equation: Equation, role: Role, unit: Unit) -> Iterator[
         elif not whole_output and unit.dimension is not Dimension.OP_PER_PV:
             yield "with 'signals: engineering' the gain's unit is 'eu/eu', '%/eu', or for a proportional band 'eu'"
         elif whole_output and not all(map(math.isfinite, equation.output.limits)):
-            yield f"'{unit.name}' refers to the output's range, and 'output.limits' is infinite; give its limits, or a gain in 'eu/eu'"
+            yield f"'{unit.name}' refers to the output's range, and 'output.limits' is infinite; give limits, or a gain in 'eu/eu'"
     in_percent = unit.dimension is Dimension.PERCENT_PER_TIME or (role in LEVELS and unit.dimension is Dimension.PERCENT)
     if in_percent and role in (*LEVELS, *RATES):
         yield f"with 'signals: engineering' the {role.value.replace('-', ' ')} is in '{unit.name.replace('%', 'eu')}'"

@@ -37,7 +37,7 @@ def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_setpoint(variant: Variant) -> Iterator[Problem]:
-    """Only a limited setpoint starts somewhere else than at the setpoint, falls at a rate of its own or is limited in some modes."""
+    """Only a limited setpoint starts elsewhere than at the setpoint, falls at a rate of its own, or is limited in some modes."""
     setpoint = variant.equation.setpoint
     if setpoint is not None and setpoint.starts == "zero" and setpoint.rate is None:
         yield variant.card.document.problem(

@@ -68,7 +68,8 @@ def _counted_in_scans(c: Conversion) -> Iterator[str]:
     for s in (c.source, c.settings):
         counted = [n for n, v in s.items() if v.active and not v.off and parse_unit(v.unit).scans]
         if counted and c.request.scan is None:
-            yield f"{s.card.id}: {', '.join(counted)} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
+            names = ", ".join(counted)
+            yield f"{s.card.id}: {names} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:

@@ -216,7 +216,8 @@ def _refuse_two_intervals(source: Settings, settings: Settings, request: Request
     """Refuse to guess two scan intervals, where dials of both controllers count in scans."""
     both = source.counts_scans and settings.counts_scans
     if request.scan is None and both and source.scan != settings.scan:
-        raise SettingError(f"dials of {source.card.id} and of {settings.card.id} count in scans; give both scan intervals, --scan H,H2")
+        cards = f"{source.card.id} and of {settings.card.id}"
+        raise SettingError(f"dials of {cards} count in scans; give both scan intervals, --scan H,H2")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
