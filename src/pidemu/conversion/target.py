@@ -304,8 +304,7 @@ class Target:
             if dial is not None:
                 dials[dial[0]] = self._in_reach(*dial, self._to_dial(*dial, value))
         if n.Tf is not None and self.filter.setting is not None:
-            base = {"effective-derivative": time / (1 + rate * time), "derivative-time": _over(n.kd, n.K)}.get(self.filter.of, time)
-            dials.update(self._filter_dial(n.Tf, base))
+            dials.update(self._filter_dial(n.Tf, self.filter_base(n)))
         return dials
 
     def _in_reach(self, name: str, setting: Setting, value: float) -> float:
