@@ -211,8 +211,10 @@ class Algorithm:
         Filters before the algorithm.
     previous_pv : bool
         The measurement of the previous scan is used.
-    sp_rate : float
-        Fastest change of the setpoint [%/s].
+    sp_rate, sp_rate_down : float
+        Fastest rise and fall of the setpoint [%/s].
+    sp_rate_local : bool
+        In cascade the remote setpoint is not limited.
     sp_from_zero, sp_tracks : bool
         The limited setpoint starts at zero; the setpoint follows the measurement in manual.
     shape : Shape, optional
@@ -277,6 +279,8 @@ class Algorithm:
     e_filter: Lag | None = None
     previous_pv: bool = False
     sp_rate: float = math.inf
+    sp_rate_down: float = math.inf
+    sp_rate_local: bool = False
     sp_from_zero: bool = False
     sp_tracks: bool = False
     shape: Shape | None = None
@@ -330,7 +334,7 @@ class Algorithm:
         if pace == 1:
             return self
         lags = {
-            name: lag if lag is None or lag.factor != 1 else replace(lag, time=lag.time * pace)  # a share per scan is one anyway
+            name: None if lag is None else replace(lag, time=lag.time * pace)
             for name, lag in (("sp_filter", self.sp_filter), ("pv_filter", self.pv_filter), ("e_filter", self.e_filter))
         }
         return replace(
@@ -356,6 +360,7 @@ class Algorithm:
             integral_deadband=None,
             integral_limits=None,
             sp_rate=math.inf,
+            sp_rate_down=math.inf,
             output_rate=math.inf,
             output_deadband=0.0,
             resolution=0.0,
@@ -374,6 +379,8 @@ class Algorithm:
             found.append(f"integral deadband of {self.integral_deadband:g}")
         if math.isfinite(self.sp_rate):
             found.append(f"setpoint rate limit of {self.sp_rate:g} per s")
+        if math.isfinite(self.sp_rate_down) and self.sp_rate_down != self.sp_rate:
+            found.append(f"setpoint rate limit of {self.sp_rate_down:g} per s downwards")
         if math.isfinite(self.output_rate):
             found.append(f"output rate limit of {self.output_rate:g} per s")
         if self.output_deadband:

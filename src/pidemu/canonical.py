@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
@@ -29,15 +29,27 @@ def gain_sign(equation: Equation) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Reader:
-    """Reads a card's dials and numbers in canonical units."""
+    """Reads a card's dials and numbers in canonical units, or in the controller's own."""
 
     settings: Settings
     spans: Spans
+    own: bool = False
 
     def value(self, name: str) -> float:
         """Return a dial's canonical value; 0 where it is off."""
         value = self.settings[name]
-        return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self.spans)
+        return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self._spans_for(value.role))
+
+    def _spans_for(self, role: Role) -> Spans:
+        """Return what a dial refers to; a gain in own units, by which the output moves over its range, to the output's span."""
+        if self.own and role is Role.GAIN:
+            span = self.settings.spans.op
+            return replace(self.spans, pv=span, op=span)
+        return self.spans
+
+    def level_of_output(self, given: str | float | None) -> float:
+        """Return a deadband of the output, which a dial for one of the measurement may hold too; 0 where there is none."""
+        return replace(self, spans=replace(self.spans, pv=self.spans.op)).pick(given, 0.0)
 
     def role(self, role: Role, default: float) -> float:
         """Return the canonical value of the dial that sets `role`."""
@@ -55,7 +67,9 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
     equation = settings.equation
     engineering = equation.signals == "engineering"
-    read = _Reader(settings, Spans() if own_units and engineering else settings.spans)
+    own = own_units and engineering
+    interval = default_scan(equation) if scan is None else scan
+    read = _Reader(settings, replace(Spans() if own else settings.spans, scan=interval), own)
     form = equation.form
     gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
     scale = read.role(Role.MULTIPLIER, 1.0)
@@ -72,7 +86,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     filt = equation.derivative.filter
     if filt is not None and equation.derivative.on == "none" and filt.applies_to in ("term", "lead-lag"):
         filt = None  # it filters what is not there
-    Tf, place, order = _filter(read, filt, rate, time)
+    Tf, place, order = _filter(read, filt, rate, time, kp, kd)
     if filt is not None and filt.applies_to == "lead-lag":
         kd -= kp * Tf
     if equation.derivative.rule is Rule.LAGGED_DIFFERENCE and not Tf:
@@ -108,7 +122,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
         bias=read.role(Role.BIAS, 0.0),
         dahlin=_dahlin(read) if form is Form.DAHLIN else None,
         **_transfer(equation),
-        **_signals(read, equation, default_scan(equation) if scan is None else scan),
+        **_signals(read, equation, interval),
         **_output(read, equation),
     )
 
@@ -132,13 +146,14 @@ def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
     return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
 
 
-def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
+def _filter(read: _Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
+    """Return the filter's time [s], place and order (specs/equations.md, section 1)."""
     if filt is None:
         return 0.0, "term", 1
     place: Place = "term" if filt.applies_to == "lead-lag" else filt.applies_to
     if filt.time is not None:
         return read.pick(filt.time, 0.0), place, filt.order
-    base = time / (1 + rate * time) if filt.of == "effective-derivative" else time
+    base = _filter_base(read, filt, rate, time, kp, kd)
     if base == 0:
         return 0.0, place, filt.order
     if isinstance(filt.gain, str) and read.settings[filt.gain].off:
@@ -151,6 +166,26 @@ def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tup
             )
         return base / gain, place, filt.order
     return base * read.pick(filt.ratio, 0.0), place, filt.order
+
+
+def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: float, kd: float) -> float:
+    """Return the derivative time that the filter's ratio or gain refers to [s].
+
+    Raises
+    ------
+    UndefinedError
+        It is ``kd/kp``, of a controller without proportional gain or with one of the other sign.
+    """
+    if filt.of == "effective-derivative":
+        return time / (1 + rate * time)
+    if filt.of == "derivative" or not kd or read.settings.equation.form is not Form.PARALLEL:
+        return time
+    if not kp or kd / kp <= 0:
+        raise UndefinedError(
+            f"{read.settings.card.id}: the derivative's filter goes with the derivative time kd/kp, and kp is {kp:g} with kd "
+            f"{kd:g}; give a proportional gain of the same sign, or switch the filter off"
+        )
+    return kd / kp
 
 
 def _gate(equation: Equation) -> Gate:
@@ -264,10 +299,13 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
     cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
+    rate = math.inf if sp is None else read.pick(sp.rate, math.inf)
     other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
     return {
         "sp_filter": _lag(read, sp, h),
-        "sp_rate": math.inf if sp is None else read.pick(sp.rate, math.inf),
+        "sp_rate": rate,
+        "sp_rate_down": rate if sp is None or sp.rate_down is None else read.pick(sp.rate_down, math.inf),
+        "sp_rate_local": sp is not None and sp.rate_counts == "local",
         "sp_from_zero": sp is not None and sp.starts == "zero",
         "sp_tracks": sp is not None and sp.tracks,
         "pv_filter": _lag(read, pv, h),
@@ -284,7 +322,7 @@ def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
     arithmetic = equation.arithmetic
     numbers: dict[str, Any] = {
         "output_rate": read.pick(equation.output.rate, math.inf),
-        "output_deadband": read.pick(equation.output.deadband, 0.0),
+        "output_deadband": read.level_of_output(equation.output.deadband),
         "resolution": read.pick(equation.output.resolution, 0.0),
     }
     if arithmetic is not None:

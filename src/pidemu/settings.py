@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from pidemu.algorithm import Algorithm
 from pidemu.card.load import Card, Statement, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.ranges import PERCENT, SignalRange
-from pidemu.units import FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
+from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
     from pidemu.law import Law
@@ -32,7 +32,7 @@ class Value:
     unit : str
         The card's unit.
     spans : Spans
-        Signal spans, for gains in engineering units.
+        Signal spans and, where dials of the card count in scans, the scan interval.
     given : bool
         Whether the user gave it; otherwise it is the card's default.
     active : bool
@@ -123,6 +123,8 @@ class Settings(Mapping[str, Value]):
     pace : float
         Interval at which the algorithm is really executed per the interval it computes with. All its times are this much longer:
         integral and derivative time, filters, ramps; the gain stays (specs/equations.md, section 3).
+    scan : float or None
+        Scan interval at which dials that count in scans are read [s], the card's unless stated; ``None`` where it has none.
     """
 
     variant: Variant
@@ -132,6 +134,7 @@ class Settings(Mapping[str, Value]):
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
     pace: float = 1.0
+    scan: float | None = field(default=None, compare=False)
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
@@ -174,7 +177,19 @@ class Settings(Mapping[str, Value]):
     @property
     def spans(self) -> Spans:
         """Signal spans; 100 where no range was given."""
-        return spans_of(self.pv_range, self.op_range)
+        return spans_of(self.pv_range, self.op_range, self.scan)
+
+    @property
+    def counts_scans(self) -> bool:
+        """Whether a dial at work counts in scans, so that the algorithm's numbers depend on the scan interval."""
+        return any(parse_unit(v.unit).scans and v.active and not v.off for v in self.values())
+
+    def at_scan(self, scan: float | None) -> Settings:
+        """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none."""
+        if scan is None or self.scan is None:
+            return self
+        values = {name: replace(v, spans=replace(v.spans, scan=scan)) for name, v in self.items()}
+        return replace(self, values_by_name=values, scan=scan)
 
     @property
     def own_ranges(self) -> tuple[SignalRange, SignalRange]:
@@ -221,7 +236,7 @@ class Settings(Mapping[str, Value]):
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
-        return self.card.settings({**given, **values})
+        return self.card.settings({**given, **values}).at_scan(self.scan)
 
     def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.
@@ -232,7 +247,8 @@ class Settings(Mapping[str, Value]):
             For a card that computes in engineering units: leave the gains in those units, as the scan program needs them,
             instead of percent of span.
         scan : float, optional
-            Scan interval, for filters that are set as a share per scan [s]; by default the card's.
+            Scan interval, for dials that count in scans and filters that are set as a share per scan [s]; by default that of
+            the settings, or the card's.
 
         Raises
         ------
@@ -243,9 +259,12 @@ class Settings(Mapping[str, Value]):
 
         equation = self.equation
         filtered = (equation.setpoint, equation.measurement, equation.error) != (None, None, None)
-        key = (own_units and equation.signals == "engineering", scan if filtered else None)  # what makes a difference
+        real, scan = scan, self.scan if scan is None else scan
+        timed = filtered or self.counts_scans
+        key = (own_units and equation.signals == "engineering", scan if timed else None)  # what makes a difference
         if key not in self._algorithms:
-            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan).paced(self.pace)
+            declared = self.scan if real is None else real / self.pace
+            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=declared).paced(self.pace)
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:
@@ -281,6 +300,6 @@ class Settings(Mapping[str, Value]):
         return Law(self.algorithm(scan=scan), scan)
 
 
-def spans_of(pv: SignalRange | None, op: SignalRange | None) -> Spans:
-    """Return the spans of signal ranges; 100 where none is given."""
-    return Spans((pv or PERCENT).span, (op or PERCENT).span)
+def spans_of(pv: SignalRange | None, op: SignalRange | None, scan: float | None = None) -> Spans:
+    """Return the spans of signal ranges, 100 where none is given, with the scan interval [s] and the size of a degree."""
+    return Spans((pv or PERCENT).span, (op or PERCENT).span, scan, DEGREES.get(pv.unit) if pv is not None else None)

@@ -232,8 +232,9 @@ def test_a_recursion_without_pid_settings_has_no_readings() -> None:
 def own_cards(tmp_path: Path) -> Path:
     """Two cards of one vendor, with times in seconds and in minutes."""
     (tmp_path / "acme").mkdir()
-    (tmp_path / "acme" / "seconds.yaml").write_text(VALID, encoding="utf-8")
-    minutes = VALID.replace("sets: integral, unit: s", "sets: integral, unit: min")
+    seconds = VALID.replace("vendor: Nobody", "vendor: Acme").replace("RESET: 60, RATE: 16", "RESET: 60 s, RATE: 16 s")
+    (tmp_path / "acme" / "seconds.yaml").write_text(seconds, encoding="utf-8")
+    minutes = seconds.replace("sets: integral, unit: s", "sets: integral, unit: min")
     minutes = minutes.replace("sets: derivative, unit: s", "sets: derivative, unit: min")
     (tmp_path / "acme" / "minutes.yaml").write_text(minutes, encoding="utf-8")
     return tmp_path

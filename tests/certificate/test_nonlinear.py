@@ -171,6 +171,7 @@ def test_an_integral_that_stands_still_at_a_limit_both_ways_never_leaves_it(tmp_
         VALID,
         ("{scheme: back-calculation, tracking-time: Ti}", "{scheme: freeze, direction: both}"),
         ("proportional: {on: error}", "proportional: {on: none}"),
+        ("{kp: 2,", "{kp: 0,"),
     )
     card = pidemu.load_card(written(tmp_path, stuck))
     found = differences(card.settings(GAIN=2, RESET=60), settings("generic/parallel", kp=0, ki=2 / 60))["windup"]

@@ -63,6 +63,11 @@ CASES: tuple[Case, ...] = (
         added("setpoint", "{starts: zero}"),
         ("9:20: 'starts: zero' belongs to a setpoint with a 'rate'",),
     ),
+    (
+        "reject_bad_setpoint",
+        added("setpoint", "{rate-counts: local}"),
+        ("9:1: 'rate-down' and 'rate-counts' belong to a setpoint with a 'rate'",),
+    ),
     ("reject_bad_error", added("error", "{shape: gap}"), ("9:1: shape 'gap' needs 'band'",)),
     ("reject_bad_error", added("error", "{shape: gain-linear}"), ("9:1: shape 'gain-linear' needs 'linearity'",)),
     ("reject_bad_error", added("error", "{shape: squared, band: 2}"), ("9:1: 'band' has no meaning with shape 'squared'",)),

@@ -225,9 +225,14 @@ def test_rounding_keeps_notes_and_never_makes_an_infinite_gain(tmp_path: Path) -
     assert conversion.source.notes == ("Ti: 1 min is 60 s",)
 
 
-@pytest.mark.parametrize("limits", ["[0, 10]", "[0, 1e-6]", "[1e6, 1e7]"])
-def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, limits: str) -> None:
-    text = edited(VALID, ('GAIN: {sets: gain, unit: "%/%"}', f'GAIN: {{sets: gain, unit: "%/%", range: {limits}}}'))
+@pytest.mark.parametrize(("limits", "inside"), [("[0, 10]", 5.0), ("[0, 1e-6]", 1e-6), ("[1e6, 1e7]", 1e6)])
+def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, limits: str, inside: float) -> None:
+    text = edited(
+        VALID,
+        ('GAIN: {sets: gain, unit: "%/%"}', f'GAIN: {{sets: gain, unit: "%/%", range: {limits}}}'),
+        ("GAIN: 2,", f"GAIN: {inside},"),
+        ("kp: 2, ki: 0.0333333, kd: 32", f"kp: {inside}, ki: {inside / 60:.6g}, kd: {inside * 16:.6g}"),
+    )
     target = pidemu.load_card(written(tmp_path, text))
     source = pidemu.load_card("generic/standard").settings(K=20000, Ti=10, Td=1)
     with pytest.raises(PidemuError, match="outside"):

@@ -23,7 +23,19 @@ EMULATION = "emulation"
 """Evidence key for how the emulation was verified; it leads to no field."""
 _REPLACED_WHOLE = ("filter", "windup")
 _SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
-_SCAN_BY_SCAN_KEYS = ("rule", "windup", "holds", "limits", "deadband", "rate", "starts", "tracks", "previous-scan")
+_SCAN_BY_SCAN_KEYS = (
+    "rule",
+    "windup",
+    "holds",
+    "limits",
+    "deadband",
+    "rate",
+    "starts",
+    "tracks",
+    "previous-scan",
+    "rate-down",
+    "rate-counts",
+)
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
 

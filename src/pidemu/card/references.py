@@ -26,6 +26,7 @@ _FIELDS: Final = (
     (("setpoint", "filter", "time"), "filter-time"),
     (("setpoint", "filter", "factor"), "filter-factor"),
     (("setpoint", "rate"), "setpoint-rate"),
+    (("setpoint", "rate_down"), "setpoint-rate"),
     (("measurement", "filter", "time"), "filter-time"),
     (("measurement", "filter", "factor"), "filter-factor"),
     (("error", "filter", "time"), "filter-time"),

@@ -39,13 +39,17 @@ def common_interval(source: Settings, target: Settings) -> float:
     """Return a scan interval for both controllers where nobody gave any [s].
 
     It is the source card's, made to suit the settings: between a 200th and a 20th of the effective integral time, and short enough
-    for the filters of both.
+    for the filters of both. Where a dial counts in scans it is the interval at which that was read.
 
     Raises
     ------
     ScanError
         No interval suits both.
     """
+    counted = [s.scan for s in (source, target) if s.counts_scans and s.scan is not None]
+    if counted:
+        source.law(counted[0]), target.law(counted[0])
+        return counted[0]
     time = time_scale(source.law())
     h = min(max(default_scan(source.equation), time / _ENOUGH), time / _COARSEST)
     for _ in range(_TRIES):

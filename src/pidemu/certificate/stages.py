@@ -156,7 +156,12 @@ def setpoint_differences(source: Side, target: Side) -> Iterator[NonlinearDiffer
         for side, other in ((source, target), (target, source))
         if _from_zero(side) and not _from_zero(other)
     ]
-    rates = {"setpoint rate limit [%/s]": _of(source, target, lambda side: side.own.sp_rate * side.pv_percent)}
+    rates = {
+        "setpoint rate limit [%/s]": _of(source, target, lambda side: side.own.sp_rate * side.pv_percent),
+        "setpoint rate limit downwards [%/s]": _of(source, target, lambda side: side.own.sp_rate_down * side.pv_percent),
+    }
+    if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(s.own.sp_rate == s.own.sp_rate_down for s in (source, target)):
+        del rates["setpoint rate limit downwards [%/s]"]
     yield from _numbers("setpoint", (source, target), rates, words)
 
 

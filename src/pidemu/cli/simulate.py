@@ -130,7 +130,7 @@ def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, sett
         yield "the loop is unstable: the figures are those of this run only"
     elif not settled:
         yield "the measurement had not settled at the end of the run; give a longer --time, or look at the margins"
-    for what in made.settings.algorithm().too_coarse(made.scan):
+    for what in made.settings.algorithm(scan=made.scan).too_coarse(made.scan):
         yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
 
 

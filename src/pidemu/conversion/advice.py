@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from pidemu.certificate.models import Kick
 from pidemu.certificate.noise import noise_change
 from pidemu.conversion.spans import range_questions, rescaling, signals_note
-from pidemu.units import Role
+from pidemu.units import Role, parse_unit
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -30,6 +30,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
         noise_change(c.source, c.settings, c.scan, c.factor).text,
         *(d.text for d in c.certificate.nonlinear if not d.inside_limits),
         *_ranges(c),
+        *_counted_in_scans(c),
         *_multiplier(c),
         *(o.idle for o in c.opens),
         *([f"The two were not run against each other: {c.certificate.not_emulated}"] if c.certificate.not_emulated else []),
@@ -50,6 +51,15 @@ def _ranges(c: Conversion) -> Iterator[str]:
     for question in range_questions(c.source, c.settings):
         yield f"{question.text}; 0 to 100 is taken"
     yield signals_note(c.source, c.settings)
+
+
+def _counted_in_scans(c: Conversion) -> Iterator[str]:
+    """Yield which dials rest on a scan interval that was not given."""
+    for s in (c.source, c.settings):
+        counted = [n for n, v in s.items() if v.active and not v.off and parse_unit(v.unit).scans]
+        if counted and c.request.scan is None:
+            names = ", ".join(counted)
+            yield f"{s.card.id}: {names} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:

@@ -303,7 +303,8 @@ class ClosedForms:
         numbers = next(iter(closed.low_frequency(self.scaled.moments(), self.target, behind)), None)
         if numbers is not None and self.target.shape.filter_on == "term":
             return a.Tf, float(self.target.filter_base(numbers))
-        plain = self.target.form is Form.PARALLEL and self.target.filter.kind != "time"
+        filt = self.target.filter
+        plain = self.target.form is Form.PARALLEL and filt.kind != "time" and filt.of != "derivative-time"
         return a.Tf, m2 / (1.0 if plain else m1 or self.target.idle_gain)
 
     def weighted(self, numbers: Numbers, problem: Problem | None = None) -> Settings:

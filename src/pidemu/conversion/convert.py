@@ -151,7 +151,7 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    source = _paced(source, request)
+    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     opens = tuple(unstated(source))
     open_questions = [o.question for o in opens if o.asked]
     ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
@@ -167,6 +167,7 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
         if settings is None:
             raise ConversionRefusedError(refusal)
     ask(missing_ranges(source, settings), source, card, request)
+    _refuse_two_intervals(source, settings, request)
     shift = "" if refusal else _forgetting(source, settings, request, work.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
@@ -259,14 +260,9 @@ class _Work:
 
         def solver(named: Mapping[str, object]) -> Solver:
             source = self.source
-            goal = Target(
-                self.card,
-                named,
-                self.fixed,
-                request.to_pv_range or source.pv_range,
-                request.to_op_range or source.op_range,
-                request.pace[1],
-            )
+            ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
+            scan = request.declared[1] if request.declared else None
+            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan)
             goal.reject_missing()
             sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
             return Solver(
@@ -354,6 +350,14 @@ def _refuse_absurd_gains(source: Settings) -> None:
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
             raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
+
+
+def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:
+    """Refuse to guess two scan intervals, where dials of both controllers count in scans."""
+    both = source.counts_scans and settings.counts_scans
+    if request.scan is None and both and source.scan != settings.scan:
+        cards = f"{source.card.id} and of {settings.card.id}"
+        raise SettingError(f"dials of {cards} count in scans; give both scan intervals, --scan H,H2")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:

@@ -63,13 +63,17 @@ class Request:
     assume: bool = False
     tag: str = ""
 
+    @property
+    def declared(self) -> tuple[float, float] | None:
+        """The intervals that source and target compute with [s]."""
+        return None if self.scan is None else (self.scan[0] / self.pace[0], self.scan[1] / self.pace[1])
+
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
         for name, value in {**self.options, **self.given}.items():
             yield from ("--set", f"{name}={exactly(value) if isinstance(value, float) else value}")
         if self.scan is not None:
-            declared = tuple(h / r for h, r in zip(self.scan, self.pace, strict=True))
-            yield from ("--scan", _intervals(declared))
+            yield from ("--scan", _intervals(self.declared or self.scan))
             if self.pace != (1.0, 1.0):
                 yield from ("--runs-every", _intervals(self.scan))
         if self.mode != "both":

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
-from pidemu.canonical import gain_sign
+from pidemu.canonical import default_scan, gain_sign
 from pidemu.card.base import Form, Rule
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
@@ -85,8 +85,8 @@ class TargetFilter:
         Whether the derivative is nothing without it: the lagged-difference rule.
     lead_lag : bool
         Whether it is the lag of a lead-lag.
-    effective : bool
-        Whether ratio or gain refer to ``Ti Td/(Ti + Td)``.
+    of : {"derivative", "derivative-time", "effective-derivative"}
+        What ratio or gain refer to: the derivative dial, ``kd/kp`` of a parallel form, ``Ti Td/(Ti + Td)``.
     low, high : float
         Allowed values, in the dial's own terms made canonical.
     """
@@ -97,7 +97,7 @@ class TargetFilter:
     value: float = 0.0
     needed: bool = False
     lead_lag: bool = False
-    effective: bool = False
+    of: Literal["derivative", "derivative-time", "effective-derivative"] = "derivative"
     low: float = 0.0
     high: float = math.inf
 
@@ -144,6 +144,8 @@ class Target:
         Ranges of measurement and output.
     pace : float
         Interval at which the target is really executed per the one that it computes with; see `Settings.pace`.
+    scan : float, optional
+        Scan interval that it computes with [s], for dials that count in scans; by default the card's.
     """
 
     def __init__(
@@ -154,6 +156,7 @@ class Target:
         pv_range: SignalRange | None,
         op_range: SignalRange | None,
         pace: float = 1.0,
+        scan: float | None = None,
     ) -> None:
         self.card = card
         self.pace = pace
@@ -161,7 +164,8 @@ class Target:
         self.options = dict(options)
         self.given = dict(given)
         self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
-        self.spans = spans_of(pv_range, op_range)
+        self.scan = scan
+        self.spans = spans_of(pv_range, op_range, default_scan(self.variant.equation) if scan is None else scan)
         self.form = self.variant.equation.form
         self.idle_gain = 1.0
         """Gain taken where there is no proportional term, so that the gain only scales the two times."""
@@ -223,14 +227,14 @@ class Target:
             return TargetFilter()
         kind: FilterKind = "ratio" if filt.ratio is not None else "gain" if filt.gain is not None else "time"
         given = filt.ratio if kind == "ratio" else filt.gain if kind == "gain" else filt.time
-        shape = {"lead_lag": filt.applies_to == "lead-lag", "effective": filt.of == "effective-derivative"}
-        shape["needed"] = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
+        needed = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
+        shape: dict[str, Any] = {"lead_lag": filt.applies_to == "lead-lag", "of": filt.of, "needed": needed}
         if not isinstance(given, str):
             return TargetFilter(kind, None, False, float(given or 0.0) * (self.pace if kind == "time" else 1.0), **shape)
         setting = self.variant.equation.settings[given]
         role, unit = Role(setting.sets), parse_unit(setting.unit)
         pace = self.pace if kind == "time" else 1.0
-        low, high = (to_canonical(role, x, unit) * pace for x in limits(setting))
+        low, high = (to_canonical(role, x, unit, self.spans) * pace for x in limits(setting))
         present = self.template()[given].canonical * pace
         return TargetFilter(kind, given, self.is_free(given, setting), present, low=low, high=high, **shape)
 
@@ -246,7 +250,7 @@ class Target:
             if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
                 undefined = setting.sets == "derivative" and self.form is Form.SERIES and not self.has_proportional
                 values[name] = (*off_values(setting), 0.0)[0] if undefined else _placeholder(setting)
-        return replace(self.card.settings({**self.variant.chosen, **values, **self.ranges}), pace=self.pace)
+        return replace(self.card.settings({**self.variant.chosen, **values, **self.ranges}), pace=self.pace).at_scan(self.scan)
 
     def settings(self, n: Numbers) -> Settings:
         """Return the target's settings for canonical numbers.
@@ -257,7 +261,7 @@ class Target:
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
         dials = {**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges}
-        return replace(self.card.settings(dials), pace=self.pace)
+        return replace(self.card.settings(dials), pace=self.pace).at_scan(self.scan)
 
     def _idle(self) -> dict[str, object]:
         """Return values for filter and weights that have no default, where nothing depends on them."""
@@ -312,8 +316,7 @@ class Target:
             if dial is not None:
                 dials[dial[0]] = self._in_reach(*dial, self._to_dial(*dial, value))
         if n.Tf is not None and self.filter.setting is not None:
-            base = time / (1 + rate * time) if self.filter.effective else time
-            dials.update(self._filter_dial(n.Tf, base * self.pace))
+            dials.update(self._filter_dial(n.Tf, self.filter_base(n)))
         return dials
 
     def _in_reach(self, name: str, setting: Setting, value: float) -> float:
@@ -369,8 +372,10 @@ class Target:
         scale = self.multiplier if n.multiplier is None else n.multiplier
         parallel = self.form is Form.PARALLEL
         scale *= self.percent_per_unit
-        time = n.kd / scale if parallel else 0.0 if _is_zero(n.K) else n.kd / n.K
-        return time / (1 + time * n.ki / n.K) if self.filter.effective and not _is_zero(time) else time
+        of_dial = parallel and self.filter.of != "derivative-time"
+        time = n.kd / scale if of_dial else _over(n.kd, n.K)
+        effective = self.filter.of == "effective-derivative" and not _is_zero(time)
+        return time / (1 + time * n.ki / n.K) if effective else time
 
     def algorithm_of(self, n: Numbers) -> Algorithm:
         """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
@@ -381,6 +386,11 @@ class Target:
         kd = n.kd - n.K * Tf if f.lead_lag else n.kd
         b, c = (own if x is None else x for own, x in ((self.shape.b, n.b), (self.shape.c, n.c)))
         return replace(self.shape, kp=n.K if self.has_proportional else 0.0, ki=n.ki, kd=kd, Tf=Tf, b=b, c=c)
+
+
+def _over(x: Any, y: Any) -> Any:
+    """Return a quotient, 0 where there is nothing to divide by."""
+    return 0.0 if _is_zero(y) else x / y
 
 
 def _is_zero(x: Any) -> bool:
