@@ -209,7 +209,7 @@ def test_new_spans_go_into_all_gains_of_a_parallel_card_and_into_one_of_a_standa
         ("simple-pid/simple-pid", {}),
         ("emerson/deltav", {"STRUCTURE": "6"}),
         ("honeywell/tdc3000", {"CTEQN": "D"}),
-        ("foxboro/ia-pid", {"MODE": "I"}),
+        ("foxboro/ia-pid", {"MODOPT": "I"}),
     ],
 )
 def test_new_spans_go_into_the_integral_gain_of_a_card_that_only_integrates(target: str, options: dict[str, object]) -> None:
@@ -416,7 +416,7 @@ SAME = [
     # series with the D term filtered: K (1 + 6/30), and Ti + Td; kd less by the filter of 0.75 s
     ("emerson/deltav", {"GAIN": 2, "RESET": 30, "RATE": 6, "FORM": "Series"}, {"FORM": "Standard"}, {"GAIN": 2.4, "RESET": 36}),
     ("honeywell/tdc3000", {"K": 2, "T1": 0.5}, {"FORM": "ideal"}, {"K": 2, "T1": 0.5}),
-    ("foxboro/ia-pid", {"PBAND": 50, "INT": 0.5}, {"MODE": "PI"}, {"PBAND": 50, "INT": 0.5}),
+    ("foxboro/ia-pid", {"PBAND": 50, "INT": 0.5}, {"MODOPT": "PI"}, {"PBAND": 50, "INT": 0.5}),
 ]
 
 

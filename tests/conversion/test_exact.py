@@ -80,7 +80,7 @@ EXACT = [
         options={"proportional_on_measurement": "true"},
     ),
     Pair("simple-pid/simple-pid", {"Kp": 2, "Ki": 0.1, "Kd": 3, "differential_on_measurement": "false"}, "generic/standard"),
-    Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODE": "PI"}, "fisher/provox"),
+    Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODOPT": "PI"}, "fisher/provox"),
 ]
 
 FEEDBACK = [

@@ -80,10 +80,10 @@ def test_weights_above_one_are_kept() -> None:
 def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -> None:
     source = pidemu.load_card("emerson/deltav").settings(GAIN=2, STRUCTURE="4")
     conversion = pidemu.convert(source, "foxboro/ia-pid")
-    assert dict(conversion.chosen) == {"MODE": "P"}
+    assert dict(conversion.chosen) == {"MODOPT": "P"}
     assert conversion.verdict == "exact"
     with pytest.raises(ConversionRefusedError, match="cannot do"):
-        pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "PID"})
+        pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "PID"})
 
 
 def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:

@@ -82,7 +82,7 @@ SHAPE = [
     ),
     Refusal("no integral", "fisher/provox", PROVOX, "emerson/deltav", "integral action", {"STRUCTURE": "3"}),
     Refusal("no integral with D on PV", "generic/standard", STANDARD, "emerson/deltav", "integral action", {"STRUCTURE": "4"}),
-    Refusal("no derivative", "generic/standard", STANDARD, "foxboro/ia-pid", "derivative action", {"MODE": "PI"}),
+    Refusal("no derivative", "generic/standard", STANDARD, "foxboro/ia-pid", "derivative action", {"MODOPT": "PI"}),
     Refusal("no proportional", "generic/standard", {"K": 2, "Ti": 60}, "emerson/deltav", "proportional action", {"STRUCTURE": "6"}),
 ]
 
@@ -280,7 +280,7 @@ def test_integral_action_alone_goes_to_cards_that_can_be_without_proportional_ac
         assert conversion.verdict == "exact"
         assert conversion.settings.law().moments()[0] == pytest.approx(0.1)
     assert pidemu.convert(source, "honeywell/tdc3000", options={"CTEQN": "D"}).verdict == "exact"
-    assert pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "I"}).verdict == "exact"
+    assert pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "I"}).verdict == "exact"
 
 
 def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:

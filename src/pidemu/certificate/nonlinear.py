@@ -150,7 +150,7 @@ def _scheme_words(both: tuple[Side, Side]) -> list[str]:
 def _scheme_name(side: Side) -> str:
     a = side.own
     tracking = f", Tt = {a.tracking_time:.4g} s" if a.windup == "back-calculation" else ""
-    back = f", returning {a.gate.fast_return:g} times as fast" if a.gate.fast_return != 1 else ""
+    back = f", returning {a.gate.fast_return:g} times as fast from beyond its windup limits" if a.gate.fast_return != 1 else ""
     return f"{a.windup}{tracking}{back}"
 
 
