@@ -355,9 +355,7 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_windup",
         ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
-        (
-            "10:42: external-reset is defined for the backward and forward rules",
-        ),
+        ("10:42: external-reset is defined for the backward and forward rules",),
     ),
     (
         "reject_bad_windup",

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import pidemu
-from pidemu.algorithm import Algorithm, Gate, Scheme
+from pidemu.algorithm import Algorithm, Gate
 from pidemu.card.base import Rule
 from pidemu.card.load import variants
 from pidemu.checks.runs import plausible
@@ -287,7 +287,7 @@ def test_positive_feedback_of_output_and_unseen_error_is_what_the_exact_solution
         return np.asarray((np.clip(kp * p + F, LOW, HIGH) + K * rest - F) / Ti)
 
     F0 = U0 - kp * unseen(0.0)[0]
-    exact = []
+    exact: list[float] = []
     for begin, end, start in ((0.0, 60.0, None), (60.0, 120.0, "before")):
         at = t[(t >= begin) & (t < end)]
         F = F0 if start is None else exact[-1]
@@ -324,13 +324,18 @@ def test_integral_alone_leaves_the_limit_as_late_as_the_lag_of_what_rested_beyon
 
 # --- a constant error brings the output to its limit -------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("card_id", pidemu.cards())
 def test_under_a_constant_error_the_output_of_every_card_reaches_its_limit(card_id: str) -> None:
     """No card stops short of it; one whose source says so would be an exception here, with that source."""
     for variant in variants(pidemu.load_card(card_id)):
         try:
             settings = plausible(variant)
-            own_limits = {n: 1000.0 if s.default is None else s.default for n, s in variant.equation.settings.items() if s.sets == "integral-limit"}
+            own_limits = {
+                n: 1000.0 if s.default is None else s.default
+                for n, s in variant.equation.settings.items()
+                if s.sets == "integral-limit"
+            }
             settings = settings.changed(own_limits)  # which stop the integral before the output's limit, as they are meant to
             a = settings.algorithm(own_units=True)
         except UndefinedError:

@@ -24,7 +24,16 @@ EMULATION = "emulation"
 _REPLACED_WHOLE = ("filter", "windup")
 _SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
 _SCAN_BY_SCAN_KEYS = ("rule", "windup", "holds", "limits", "deadband", "rate", "starts", "tracks", "previous-scan")
-_BEYOND_THE_LAW = ("tracking-time", "integral-limit", "windup-limit", "deadband", "bias", "output-rate", "setpoint-rate", "resolution")
+_BEYOND_THE_LAW = (
+    "tracking-time",
+    "integral-limit",
+    "windup-limit",
+    "deadband",
+    "bias",
+    "output-rate",
+    "setpoint-rate",
+    "resolution",
+)
 """What dials set that the linear law leaves out."""
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
