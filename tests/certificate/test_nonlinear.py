@@ -72,9 +72,11 @@ def test_less_than_a_scan_is_no_difference() -> None:
 
 def test_provox_and_deltav_differ_in_the_way_back() -> None:
     source = settings("fisher/provox", GAIN=2.0, RESET=1)
-    target = settings("emerson/deltav", GAIN=2.0, RESET=60)
+    assert "windup" not in differences(source, settings("emerson/deltav", GAIN=2.0, RESET=60))  # both are positive feedback
+    target = settings("emerson/deltav", GAIN=2.0, RESET=60, ARW_HI_LIM=90, ARW_LO_LIM=10)
     found = differences(source, target)["windup"]
-    assert "fisher/provox (external-reset) as well as emerson/deltav (external-reset, returning 16 times as fast)" in found.text
+    fast = "emerson/deltav (external-reset, returning 16 times as fast from beyond its windup limits)"
+    assert f"fisher/provox (external-reset) as well as {fast}" in found.text
     for s, stays, at_zero in zip((source, target), found.figures[STAYS], found.figures[AT_ZERO], strict=True):
         output, turn, end = excursion(s, 60.0, 4.0, 1.0)
         assert output[turn - 1] == 100

@@ -68,7 +68,7 @@ def test_convert_as_json_holds_what_programs_need() -> None:
         "options": {},
     }
     assert {"card", "settings", "options"} == set(found["to"])
-    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "7"}
+    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "7", "FRSIPID_OPTS": "none"}
     assert found["chosen"] == {"STRUCTURE": "7"}
     assert found["to"]["settings"]["RESET"] == {"value": 20.25, "unit": "s/repeat"}
     assert found["verdict"] == "exact"

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import pidemu
-from pidemu.algorithm import Algorithm, Gate
+from pidemu.algorithm import Algorithm, Gate, Lag, Shape
 from pidemu.card.base import Rule
 from pidemu.card.load import variants
 from pidemu.checks.runs import plausible
@@ -260,6 +260,27 @@ def test_the_fast_return_ends_at_its_own_limit_and_never_begins_at_the_outputs()
     assert fast[:11] == pytest.approx([-0.8] * 11, abs=1e-12)  # 99.05 to 90.25
     assert fast[11] == pytest.approx(-0.25, abs=1e-12)
     assert fast[12:] == pytest.approx([-0.05] * 28, abs=1e-12)
+
+
+def test_deltavs_limits_of_the_windup_are_levels_of_its_output_and_do_nothing_unless_they_are_given() -> None:
+    card = pidemu.load_card("emerson/deltav")
+    for structure in ("1", "2", "5", "6", "7"):
+        plain = card.settings(GAIN=2, RESET=60, STRUCTURE=structure).algorithm()
+        assert (plain.windup, plain.gate) == ("external-reset", Gate())
+    given = card.settings(GAIN=2, RESET=60, ARW_HI_LIM=18, ARW_LO_LIM=5, op_range=(4, 20))
+    assert given.algorithm().gate == Gate(fast_return=16.0, fast_beyond=(6.25, 87.5))
+    assert given.algorithm().linear.gate == Gate()
+    assert given.algorithm().beyond_the_law == ["integral 16 times as fast on the way back from below 6.25 or above 87.5"]
+
+
+def test_deltavs_nonlinear_gain_is_a_gap_of_p_and_i_and_its_filters_are_off_unless_they_are_given() -> None:
+    card = pidemu.load_card("emerson/deltav")
+    plain = card.settings(GAIN=2, RESET=60).algorithm()
+    assert (plain.shape, plain.pv_filter, plain.sp_filter) == (None, None, None)
+    given = card.settings(GAIN=2, RESET=60, NL_GAP=3, NL_MINMOD=0.25, PV_FTIME=2, SP_FTIME=4)
+    assert given.options["FRSIPID_OPTS"] == "nonlinear gain"
+    a = given.algorithm()
+    assert (a.shape, a.pv_filter, a.sp_filter) == (Shape(kind="gap", band=3.0, gain=0.25), Lag(2.0), Lag(4.0))
 
 
 # --- external reset where P does not see the whole error ---------------------------------------------------------------
