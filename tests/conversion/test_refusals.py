@@ -284,6 +284,12 @@ def test_integral_action_alone_goes_to_cards_that_can_be_without_proportional_ac
     assert pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "I"}).verdict == "exact"
 
 
+def test_integral_alone_behind_a_measurement_filter_is_refused_by_a_series_form_and_does_not_crash() -> None:
+    source = pidemu.load_card("emerson/deltav").settings(GAIN=1, RESET=1, STRUCTURE="5", PV_FTIME=1)
+    with pytest.raises(ConversionRefusedError, match="the source has no proportional action"):
+        pidemu.convert(source, "honeywell/tdc3000", options={"FORM": "interactive"}, match="low-frequency", emulate=False)
+
+
 def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:
     for dials in (
         {"RSET": 0.02},
