@@ -43,6 +43,7 @@ _SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
     Role.TRACKING_TIME: st.floats(1, 3000),
     Role.FILTER_FACTOR: st.just(1.0) | st.floats(0.1, 1),
     Role.INTEGRAL_LIMIT: st.floats(5, 500),
+    Role.WINDUP_LIMIT: st.floats(60, 120),
     Role.DEADBAND: st.just(0.0) | st.floats(0.1, 10),
     Role.GAP_GAIN: st.floats(0, 1),
     Role.LINEARITY: st.just(1.0) | st.floats(0.1, 1),

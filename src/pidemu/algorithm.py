@@ -93,8 +93,12 @@ class Gate:
         After a freeze the trapezoidal rule goes on from the last error that was integrated.
     by_output_sign : bool
         `conditional` judges by the sign of error times output.
+    drops : bool
+        `conditional` drops an increment that leads beyond a limit, instead of keeping what leads to the limit.
     fast_return : float
-        Factor on an increment that leads back from a limit.
+        With `external-reset`: factor on an increment that leads back from beyond `fast_beyond`.
+    fast_beyond : tuple of float
+        Low and high limit of the output for that [%].
     clamped : bool
         `recompute` limits the integral to the output limits as well.
     """
@@ -105,7 +109,9 @@ class Gate:
     unless_smaller: bool = False
     from_integrated: bool = False
     by_output_sign: bool = False
+    drops: bool = False
     fast_return: float = 1.0
+    fast_beyond: tuple[float, float] = (-math.inf, math.inf)
     clamped: bool = False
 
 
@@ -356,6 +362,7 @@ class Algorithm:
         return replace(
             self,
             precision="float64",
+            gate=replace(self.gate, fast_return=1.0, fast_beyond=(-math.inf, math.inf)),
             shape=None,
             integral_deadband=None,
             integral_limits=None,
@@ -377,6 +384,9 @@ class Algorithm:
             found.append(f"error: {name}{band}")
         if self.integral_deadband:
             found.append(f"integral deadband of {self.integral_deadband:g}")
+        if self.ki and self.gate.fast_return != 1:
+            low, high = self.gate.fast_beyond
+            found.append(f"integral {self.gate.fast_return:g} times as fast on the way back from below {low:g} or above {high:g}")
         if math.isfinite(self.sp_rate):
             found.append(f"setpoint rate limit of {self.sp_rate:g} per s")
         if math.isfinite(self.sp_rate_down) and self.sp_rate_down != self.sp_rate:

@@ -8,12 +8,19 @@ from typing import Any
 
 from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
 from pidemu.card.base import Form, Rule
-from pidemu.card.integral import IntegralLimits, WindupBackCalculation, WindupExternalReset, WindupGate, WindupRecompute
+from pidemu.card.integral import (
+    FastReturn,
+    IntegralLimits,
+    WindupBackCalculation,
+    WindupExternalReset,
+    WindupGate,
+    WindupRecompute,
+)
 from pidemu.card.models import Equation
 from pidemu.card.terms import ErrorShape, Filter, Measurement, Setpoint
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
-from pidemu.units import Role, Spans, parse_quantity, parse_unit, to_canonical
+from pidemu.units import Dimension, Role, Spans, parse_quantity, parse_unit, to_canonical
 
 
 def default_scan(equation: Equation) -> float:
@@ -109,7 +116,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
         derivative_rule=equation.derivative.rule,
         filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
         windup=equation.integral.windup.scheme,
-        gate=_gate(equation),
+        gate=_gate(read, equation),
         tracking_time=_tracking(read, rate, time, kp, ki, kd) if ki else 0.0,
         implicit_tracking=getattr(equation.integral.windup, "implicit", False),
         limits_without_integral=getattr(equation.integral.windup, "without_integral", "zero") == "limited",
@@ -188,7 +195,7 @@ def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: floa
     return kd / kp
 
 
-def _gate(equation: Equation) -> Gate:
+def _gate(read: _Reader, equation: Equation) -> Gate:
     match equation.integral.windup:
         case WindupGate() as w:
             return Gate(
@@ -198,13 +205,21 @@ def _gate(equation: Equation) -> Gate:
                 unless_smaller=w.direction == "unless-smaller",
                 from_integrated=w.resumes_from == "last-integrated",
                 by_output_sign=w.test == "error-times-output",
-                fast_return=w.fast_return,
+                drops=w.last_increment == "dropped",
             )
         case WindupRecompute() as w:
             return Gate(without_derivative=w.without_derivative, clamped=w.clamped)
-        case WindupExternalReset() as w:
-            return Gate(fast_return=w.fast_return)
+        case WindupExternalReset(fast_return=FastReturn() as f):
+            beyond = _level(read, f.low, -math.inf), _level(read, f.high, math.inf)
+            return Gate(fast_return=f.factor, fast_beyond=beyond) if beyond != (-math.inf, math.inf) else Gate()
     return Gate()
+
+
+def _level(read: _Reader, given: str | float, default: float) -> float:
+    """Return a level of the output [%]: a level in engineering units counts from the low end of the range."""
+    level, low = read.pick(given, default), (read.settings.op_range or (0.0, 0.0))[0]
+    in_units = isinstance(given, str) and parse_unit(read.settings[given].unit).dimension is Dimension.PV_UNITS
+    return level - 100 * low / read.spans.op if in_units and read.settings.equation.signals == "percent" else level
 
 
 def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:

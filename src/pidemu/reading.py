@@ -60,7 +60,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
                 notes.append(f"{name} is not used with {variant.choice_text}")
     if faults:
         raise SettingError("\n".join(faults))
-    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted, scan)
+    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted, scan=scan)
 
 
 def _refuse_twice(card: Card, given: Mapping[str, object]) -> None:
@@ -106,11 +106,11 @@ def signal_range(card: Card, name: str, given: object) -> SignalRange | None:
         raise SettingError(f"{card.id}: {name}: {error}") from None
 
 
-def _output_range(equation: Equation) -> tuple[float, float] | None:
+def _output_range(equation: Equation) -> SignalRange | None:
     """Return the output's range where it is the card's: a band, or a gain in % of output, moves it over just that."""
     units = [parse_unit(s.unit).dimension for s in equation.settings.values() if s.sets == "gain"]
     known = equation.signals == "engineering" and all(map(math.isfinite, equation.output.limits))
-    return equation.output.limits if known and units and units[0] in _OF_WHOLE_OUTPUT else None
+    return SignalRange(*equation.output.limits) if known and units and units[0] in _OF_WHOLE_OUTPUT else None
 
 
 def _read(

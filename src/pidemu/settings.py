@@ -205,7 +205,7 @@ class Settings(Mapping[str, Value]):
     def assumptions(self) -> list[Statement]:
         """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose.
 
-        What is assumed of the derivative does not count where it is off.
+        What is assumed of the derivative, or of a filter on a signal, does not count where it is off.
         """
         return self._at_work(self.variant.assumptions(self.defaulted))
 
@@ -219,7 +219,10 @@ class Settings(Mapping[str, Value]):
 
     def _at_work(self, found: list[Statement]) -> list[Statement]:
         a = self.algorithm()
-        return [s for s in found if a.kd or a.Tf or not s.path.startswith("derivative")]
+        off: tuple[str, ...] = () if a.kd or a.Tf else ("derivative",)
+        off += () if a.sp_filter else ("setpoint.filter",)
+        off += () if a.pv_filter else ("measurement.filter",)
+        return [s for s in found if not s.path.startswith(off)] if off else found
 
     def changed(self, values: Mapping[str, object]) -> Settings:
         """Return these settings with some changed, by name; options as well.

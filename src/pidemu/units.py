@@ -67,6 +67,7 @@ class Role(StrEnum):
     TRACKING_TIME = "tracking-time"
     FILTER_FACTOR = "filter-factor"
     INTEGRAL_LIMIT = "integral-limit"
+    WINDUP_LIMIT = "windup-limit"
     DEADBAND = "deadband"
     GAP_GAIN = "gap-gain"
     LINEARITY = "linearity"
@@ -81,7 +82,7 @@ class Role(StrEnum):
     CLOSED_LOOP_TIME = "closed-loop-time"
 
 
-LEVELS: Final = (Role.INTEGRAL_LIMIT, Role.DEADBAND, Role.BIAS, Role.RESOLUTION)
+LEVELS: Final = (Role.INTEGRAL_LIMIT, Role.WINDUP_LIMIT, Role.DEADBAND, Role.BIAS, Role.RESOLUTION)
 """Roles whose canonical value is a signal's [%]."""
 RATES: Final = (Role.OUTPUT_RATE, Role.SETPOINT_RATE)
 """Roles whose canonical value is a signal's rate of change [%/s]."""

@@ -355,7 +355,7 @@ def test_the_json_answer_has_the_shape_that_stays() -> None:
     assert isinstance(source, dict)
     assert isinstance(certificate, dict)
     assert goal["card"] == "emerson/deltav"
-    assert goal["options"] == {"FORM": "Standard", "STRUCTURE": "7"}
+    assert goal["options"] == {"FORM": "Standard", "STRUCTURE": "7", "FRSIPID_OPTS": "none"}
     assert answer["chosen"] == {"STRUCTURE": "7"}
     assert goal["settings"]["RESET"] == {"value": pytest.approx(20.25), "unit": "s/repeat"}
     assert source["settings"]["RESET"] == {"value": 4.0, "unit": "repeat/min"}

@@ -73,6 +73,18 @@ STATEMENTS: tuple[Case, ...] = (
         ("34:3: 'assumed' needs 'note'",),
     ),
     (
+        "reject_proof_from_another_product",
+        (
+            ("read: 2026-01-02}", "read: 2026-01-02}\n  toy: {title: Toy bench, read: 2026-01-02, product: another bench}"),
+            ("form: {status: documented, source: manual,", "form: {status: documented, source: toy,"),
+            ("implementation: {status: measured, source: manual,", "implementation: {status: measured, source: toy,"),
+        ),
+        (
+            "31:18: 'toy' is about another bench, which does not make this documented; write 'inferred' and why",
+            "32:28: 'toy' is about another bench, which does not make this measured; write 'inferred' and why",
+        ),
+    ),
+    (
         "reject_evidence_for_nothing",
         (("quirks:\n", "  options.FORM: {status: assumed, note: a guess}\nquirks:\n"),),
         ("42:3: nothing at 'options.FORM' in this card (did you mean 'options'?)",),
@@ -399,10 +411,7 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_windup",
         ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
-        (
-            "10:42: external-reset is defined for the backward and forward rules",
-            "10:42: external-reset needs P on the error: positive feedback of another P settles beyond the limit",
-        ),
+        ("10:42: external-reset is defined for the backward and forward rules",),
     ),
     (
         "reject_bad_windup",
@@ -448,6 +457,14 @@ EQUATIONS: tuple[Case, ...] = (
 )
 
 RUNS: tuple[Case, ...] = (
+    (
+        "reject_windup_that_stops_short",
+        ((WINDUP, "{scheme: conditional, last-increment: dropped}"),),
+        (
+            "10:39: under a constant error the output stays at 99.79 % and never reaches its limit; only what is documented or "
+            "measured may do that",
+        ),
+    ),
     ("reject_wrong_examples", (("{kp: 2,", "{kp: 3,"),), ("46:21: kp is 3, the settings amount to 2",)),
     ("reject_wrong_examples", ((", Tf: 2}", "}"),), ("46:16: Tf is 0, the settings amount to 2",)),
     (

@@ -161,12 +161,17 @@ CASES: tuple[Case, ...] = (
     (
         "reject_bad_windup_details",
         ((WINDUP, "{scheme: freeze, test: error-times-output}"),),
-        ("10:39: 'test' belongs to 'conditional'",),
+        ("10:39: 'test' and 'last-increment' belong to 'conditional'",),
     ),
     (
         "reject_bad_windup_details",
-        ((WINDUP, "{scheme: freeze, direction: both, fast-return: 16}"),),
-        ("10:39: 'fast-return' has no meaning with 'direction: both', which stops the way back as well",),
+        ((WINDUP, "{scheme: conditional, test: error-times-output}"),),
+        ("10:39: 'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'",),
+    ),
+    (
+        "reject_bad_windup_details",
+        ((WINDUP, "{scheme: conditional, last-increment: dropped}"), ("rule: backward", "rule: forward")),
+        ("10:38: 'last-increment' has no meaning under the forward rule, whose increment comes after the output",),
     ),
     (
         "reject_bad_windup_details",

@@ -80,10 +80,10 @@ def test_weights_above_one_are_kept() -> None:
 def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -> None:
     source = pidemu.load_card("emerson/deltav").settings(GAIN=2, STRUCTURE="4")
     conversion = pidemu.convert(source, "foxboro/ia-pid")
-    assert dict(conversion.chosen) == {"MODE": "P"}
+    assert dict(conversion.chosen) == {"MODOPT": "P"}
     assert conversion.verdict == "exact"
     with pytest.raises(ConversionRefusedError, match="cannot do"):
-        pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "PID"})
+        pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "PID"})
 
 
 def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
@@ -101,7 +101,7 @@ def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
 def test_options_that_the_user_chose_are_kept() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
     conversion = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": "1"})
-    assert conversion.settings.options == {"FORM": "Standard", "STRUCTURE": "1"}
+    assert conversion.settings.options == {"FORM": "Standard", "STRUCTURE": "1", "FRSIPID_OPTS": "none"}
     assert dict(conversion.chosen) == {}
     assert conversion.verdict == "exact-feedback"
 
@@ -116,7 +116,7 @@ def test_the_defaults_stay_where_no_choice_does_better() -> None:
 def test_every_choice_is_ranked_on_request_and_no_later_one_has_a_better_verdict() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
     ranking = pidemu.convert(source, "emerson/deltav", all_options=True).ranking
-    assert len(ranking) == 16  # two forms, eight structures
+    assert len(ranking) == 32  # two forms, eight structures, with and without nonlinear gain
     order = ["exact", "exact-feedback", "approximate", "refused"]
     places = [order.index(a.verdict) for a in ranking]
     assert places == sorted(places)

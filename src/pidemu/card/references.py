@@ -20,6 +20,8 @@ _FIELDS: Final = (
     (("derivative", "filter", "gain"), "filter-gain"),
     (("derivative", "filter", "time"), "filter-time"),
     (("integral", "windup", "tracking_time"), "tracking-time"),
+    (("integral", "windup", "fast_return", "high"), "windup-limit"),
+    (("integral", "windup", "fast_return", "low"), "windup-limit"),
     (("integral", "limits", "low"), "integral-limit"),
     (("integral", "limits", "high"), "integral-limit"),
     (("integral", "deadband"), "deadband"),

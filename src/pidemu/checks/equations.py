@@ -187,7 +187,7 @@ def reject_bad_references(variant: Variant) -> Iterator[Problem]:
 
 def _wrong_number(field: str, role: str, x: float) -> str | None:
     """Return what is wrong with a number that stands where a setting's name could."""
-    if role == "integral-limit":
+    if role in ("integral-limit", "windup-limit"):
         return f"{field} is {x:g}; it is a number" if math.isnan(x) else None
     if not 0 <= x < math.inf and role != "filter-factor":  # which has a rule of its own
         return f"{field} is {x:g}; it is a number from 0 up"
@@ -247,9 +247,6 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
     if scheme == "external-reset" and equation.integral.rule is Rule.TRAPEZOIDAL:
         yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
-    if scheme == "external-reset" and equation.integral.on != "none" and equation.proportional.on != "error":
-        message = "external-reset needs P on the error: positive feedback of another P settles beyond the limit"
-        yield document.problem(home, message, at_key=True)
     if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
         place = variant.home(("proportional", "accumulated"))
         yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)

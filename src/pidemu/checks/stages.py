@@ -142,11 +142,13 @@ def _wrong_gate(w: WindupGate, rule: Rule) -> Iterator[str]:
     if w.scheme == "conditional":
         if (w.judged_on, w.direction, w.resumes_from) != ("output", "further", "last"):
             yield "'judged-on', 'direction' and 'resumes-from' belong to 'freeze'"
+        if w.last_increment == "dropped" and rule is Rule.FORWARD:
+            yield "'last-increment' has no meaning under the forward rule, whose increment comes after the output"
+        if w.test == "error-times-output" and w.last_increment != "dropped" and rule is not Rule.FORWARD:
+            yield "'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'"
         return
-    if w.test != "increment":
-        yield "'test' belongs to 'conditional'"
-    if w.direction == "both" and w.judged_on != "sum" and w.fast_return != 1:
-        yield "'fast-return' has no meaning with 'direction: both', which stops the way back as well"
+    if (w.test, w.last_increment) != ("increment", "to-the-limit"):
+        yield "'test' and 'last-increment' belong to 'conditional'"
     if w.resumes_from != "last" and rule is not Rule.TRAPEZOIDAL:
         yield "'resumes-from' belongs to the trapezoidal rule"
     if w.judged_on == "sum" and rule is Rule.FORWARD:

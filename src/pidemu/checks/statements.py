@@ -64,6 +64,15 @@ def reject_incomplete_evidence(card: Card) -> Iterator[Problem]:
             yield card.document.problem(("evidence", key), f"'{e.status.value}' needs '{name}'", at_key=True)
 
 
+def reject_proof_from_another_product(card: Card) -> Iterator[Problem]:
+    """What a source says of another product is no more than a reason to infer the same of this one."""
+    for key, e in card.data.evidence.items():
+        source = card.data.sources.get(e.source or "")
+        if e.status in (Status.DOCUMENTED, Status.MEASURED) and source is not None and source.product is not None:
+            message = f"'{e.source}' is about {source.product}, which does not make this {e.status.value}; write 'inferred' and why"
+            yield card.document.problem(("evidence", key, "status"), message)
+
+
 def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
     """An evidence path leads to something in the card."""
     known = {dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1)}
@@ -117,6 +126,7 @@ RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
     reject_dangling_sources,
     reject_unused_sources,
     reject_incomplete_evidence,
+    reject_proof_from_another_product,
     reject_evidence_for_nothing,
     reject_fields_without_evidence,
     reject_overlapping_options,

@@ -255,7 +255,10 @@ class ClosedForms:
 
         def numbers(moments: Sequence[float]) -> Numbers:
             if derivative:
-                return next(iter(self._matched(moments, self.target.filter)))
+                found = next(iter(self._matched(moments, self.target.filter)))
+                if self.target.form is Form.SERIES and found.kd and not (found.K and self.target.has_proportional):
+                    raise NoMatchError("a series form has no derivative without proportional action")
+                return found
             return replace(next(iter(self._matched((*moments[:2], 0.0), self.target.filter))), kd=0.0)
 
         wanted, scan = at_scan or (self.law, None)

@@ -36,6 +36,7 @@ _OTHERS: Final = {
     Role.DERIVATIVE_WEIGHT: 1.0,
     Role.TRACKING_TIME: math.sqrt(INTEGRAL_TIME * DERIVATIVE_TIME),
     Role.INTEGRAL_LIMIT: 100.0,
+    Role.WINDUP_LIMIT: 100.0,
 }
 """What a dial is set to where the card has no default, in canonical units; the tracking time as Astrom and Hagglund propose."""
 
