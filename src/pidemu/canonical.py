@@ -28,7 +28,7 @@ def gain_sign(equation: Equation) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class Reader:
     """Reads a card's dials and numbers in canonical units."""
 
     settings: Settings
@@ -39,6 +39,15 @@ class _Reader:
         value = self.settings[name]
         return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self.spans)
 
+    def number(self, x: float) -> float:
+        """Return a constant of the card."""
+        return x
+
+    @property
+    def span_ratio(self) -> float:
+        """Percent gain that one output unit per measurement unit amounts to [%/%]."""
+        return float(self.spans.ratio)
+
     def role(self, role: Role, default: float) -> float:
         """Return the canonical value of the dial that sets `role`."""
         value = self.settings.by_role(role)
@@ -48,14 +57,20 @@ class _Reader:
         """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
         if isinstance(given, str):
             return default if self.settings[given].off else self.value(given)
-        return default if given is None else given
+        return default if given is None else self.number(given)
 
 
 def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
+    engineering = settings.equation.signals == "engineering"
+    return algorithm_as_read(Reader(settings, Spans() if own_units and engineering else settings.spans), scan)
+
+
+def algorithm_as_read(read: Reader, scan: float | None = None) -> Algorithm:
+    """Return the algorithm with its numbers as a reader reads them: floats, or without rounding."""
+    settings = read.settings
     equation = settings.equation
     engineering = equation.signals == "engineering"
-    read = _Reader(settings, Spans() if own_units and engineering else settings.spans)
     form = equation.form
     gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
     scale = read.role(Role.MULTIPLIER, 1.0)
@@ -63,7 +78,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     time = read.role(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
     if form is Form.PARALLEL:
         kp = gain * scale
-        scale *= float(read.spans.ratio) if engineering else 1.0
+        scale *= read.span_ratio if engineering else 1.0
         scale *= gain_sign(equation)
         ki, kd = rate * scale, time * scale
     else:
@@ -126,13 +141,13 @@ def _some(value: float) -> float | None:
     return value if value else None
 
 
-def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
+def _weight(read: Reader, on: str, weight: str | float | None) -> float:
     if on != "weighted":
         return float(on == "error")
-    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
+    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else read.number(weight)
 
 
-def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
+def _filter(read: Reader, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
     if filt is None:
         return 0.0, "term", 1
     place: Place = "term" if filt.applies_to == "lead-lag" else filt.applies_to
@@ -172,7 +187,7 @@ def _gate(equation: Equation) -> Gate:
     return Gate()
 
 
-def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
+def _tracking(read: Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
     """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
     parallel = read.settings.equation.form is Form.PARALLEL
     integral_time = abs(kp / ki if parallel and kp else 1 / rate)
@@ -190,7 +205,7 @@ def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd:
     return found * integral_time if windup.times == "Ti" else found
 
 
-def _integral_limits(read: _Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
+def _integral_limits(read: Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
     if limits is None:
         return None
 
@@ -221,7 +236,7 @@ def _transfer(equation: Equation) -> dict[str, Any]:
     }
 
 
-def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
+def _lag(read: Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
     """Return a signal's filter, or ``None`` where there is none or it is off."""
     filt = None if signal is None else signal.filter
     if filt is None:
@@ -232,10 +247,10 @@ def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: f
     factor = read.pick(filt.factor, 1.0)
     if not 0 < factor <= 1:
         raise SettingError(f"{read.settings.card.id}: {filt.factor} is {factor:g}; a share of the new sample is above 0, up to 1")
-    return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
+    return Lag(read.number(h) * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
 
 
-def _shape(read: _Reader, equation: Equation) -> Shape | None:
+def _shape(read: Reader, equation: Equation) -> Shape | None:
     """Return what is done to the error, or ``None`` where that is nothing; P on the measurement itself is no error."""
     error = equation.error
     if error is None or error.shape == "linear":
@@ -260,7 +275,7 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
     )
 
 
-def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
+def _signals(read: Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
     cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
@@ -280,7 +295,7 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     }
 
 
-def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
+def _output(read: Reader, equation: Equation) -> dict[str, Any]:
     arithmetic = equation.arithmetic
     numbers: dict[str, Any] = {
         "output_rate": read.pick(equation.output.rate, math.inf),
@@ -297,7 +312,7 @@ def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
     return numbers
 
 
-def _dahlin(read: _Reader) -> Dahlin:
+def _dahlin(read: Reader) -> Dahlin:
     found = Dahlin(
         gain=read.role(Role.PROCESS_GAIN, 1.0),
         time=read.role(Role.PROCESS_TIME, 0.0),
