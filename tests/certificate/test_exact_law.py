@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.certificate.exact_law import ExactLaw, divide, exact_algorithm, exact_paths, polynomial_text, trimmed
+from pidemu.certificate.exact_law import ExactLaw, difference, divide, exact_algorithm, exact_paths, polynomial_text, trimmed
 from pidemu.exact_numbers import Exact
 from pidemu.rational import multiply
 from pidemu.settings import Settings
@@ -101,7 +101,6 @@ def test_a_common_factor_cancels_and_changes_nothing(a: list[Fraction], b: list[
     plain, longer = ExactLaw.of(top, bottom), ExactLaw.of(multiply(top, common), multiply(bottom, common))
     assert plain == longer
     assert plain.equals(longer)
-    assert plain.distance(longer) == 0
 
 
 @given(a=COEFFICIENTS, b=COEFFICIENTS)
@@ -113,10 +112,18 @@ def test_quotient_and_remainder_are_those_of_sympy(a: list[Fraction], b: list[Fr
     assert [sp.Poly([rational(str(x.a)) for x in reversed(p)], s, domain="QQ") for p in (quotient, rest)] == list(expected)
 
 
-def test_the_distance_is_relative_to_what_a_coefficient_is_the_sum_of() -> None:
-    one, other = ExactLaw.of([1, 2], [0, 1]), ExactLaw.of([1, Exact("2.002")], [0, 1])
-    assert math.isclose(one.distance(other), 0.001 / 1.001, rel_tol=1e-12)
-    assert not one.equals(other)
+def test_the_difference_is_relative_to_what_a_coefficient_is_the_sum_of() -> None:
+    card = pidemu.load_card("generic/parallel")
+    one, other = (exact_algorithm(card.settings(kp=kp, ki=1)) for kp in (2, 2.002))
+    assert math.isclose(difference(one, other, "feedback", Exact(1)), 0.002 / 2.002, rel_tol=1e-12)
+    assert not exact_paths(one, ["feedback"])["feedback"].equals(exact_paths(other, ["feedback"])["feedback"])
+
+
+def test_rounded_numbers_that_cancel_make_no_more_of_a_difference() -> None:
+    card = pidemu.load_card("generic/parallel")
+    plain = exact_algorithm(card.settings(kp=1, ki=1))
+    filtered = exact_algorithm(card.settings(kp=1, ki=1, kd="1e-14 s", Tf=100))
+    assert difference(plain, filtered, "feedback", Exact(1)) < 1e-14
 
 
 def test_polynomials_are_printed_as_written_by_hand() -> None:

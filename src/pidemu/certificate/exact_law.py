@@ -77,17 +77,6 @@ class ExactLaw:
         """Whether both are the same function: the cross products agree term by term."""
         return trimmed(multiply(self.num, other.den)) == trimmed(multiply(other.num, self.den))
 
-    def distance(self, other: ExactLaw) -> float:
-        """Return the largest difference of the coefficients of the cross products, each relative to what it is the sum of."""
-        mine, others = ((a.num, b.den) for a, b in ((self, other), (other, self)))
-        difference = add(multiply(*mine), [-x for x in multiply(*others)])
-        sizes = [multiply(*(tuple(map(abs, p)) for p in pair)) for pair in (mine, others)]
-        largest = Fraction(0)
-        for k, x in enumerate(difference):
-            size = max((exact(part[k]).near for part in sizes if k < len(part)), default=Fraction(0))
-            largest = max(largest, abs(exact(x).near) / size if size else Fraction(0))
-        return float(largest)
-
     def __str__(self) -> str:
         """The quotient as written by hand, such as ``(2/15 + 14/5 s + 12 s^2)/(s (1 + 3/4 s))``."""
         lowest = next(k for k, x in enumerate(self.den) if x)
@@ -206,10 +195,52 @@ def exact_paths(a: Algorithm, names: Sequence[PathName], factor: Exact | int = 1
     UndefinedError
         There is no continuous law.
     """
-    plain: tuple[Rational, Rational] = laws.paths(a, laws.CONTINUOUS)
     found: dict[PathName, ExactLaw] = {}
     for name in names:
-        both = plain if in_mode(a, name) is a else laws.paths(in_mode(a, name), laws.CONTINUOUS)
-        path = both[name != "feedback"]
+        path = _quotient(a, name)
         found[name] = ExactLaw.of([x * factor for x in trimmed(path.num)], path.den)
     return found
+
+
+def _quotient(a: Algorithm, name: PathName) -> Rational:
+    """Return a path as its terms make it, not in lowest terms."""
+    both: tuple[Rational, Rational] = laws.paths(in_mode(a, name), laws.CONTINUOUS)
+    return both[name != "feedback"]
+
+
+def difference(source: Algorithm, target: Algorithm, name: PathName, factor: Exact) -> float:
+    """Return the largest difference of the coefficients of the cross products of two paths.
+
+    Each is relative to the sum of the sizes of everything that the coefficient is the sum of, so that rounded numbers that cancel
+    make no more of a difference than rounded numbers that do not.
+
+    Parameters
+    ----------
+    source, target : Algorithm
+        Two algorithms with exact numbers.
+    name : {"feedback", "setpoint", "setpoint in cascade"}
+        Which path.
+    factor : Exact
+        What the source is multiplied by.
+    """
+    products = []
+    for one, other in ((source, target), (_sizes(source), _sizes(target))):
+        a, b = (_quotient(x, name) for x in (one, other))
+        times = factor if one is source else abs(factor)
+        products += [multiply([x * times for x in trimmed(a.num)], b.den), multiply(b.num, a.den)]
+    left, right, *sizes = products
+    largest = Fraction(0)
+    for k, x in enumerate(add(left, [-y for y in right])):
+        size = max((exact(part[k]).near for part in sizes if k < len(part)), default=Fraction(0))
+        largest = max(largest, abs(exact(x).near) / size if size else Fraction(0))
+    return float(largest)
+
+
+def _sizes(a: Algorithm) -> Algorithm:
+    """Return an algorithm whose law is the sum of the sizes of all terms."""
+    a = replace(a, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd), c=abs(a.c))
+    return replace(a, b=_size_of_weight(a, a.b), cascade_b=None if a.cascade_b is None else _size_of_weight(a, a.cascade_b))
+
+
+def _size_of_weight(a: Algorithm, b: Any) -> Any:
+    return 1 + abs(b - 1) if a.series and a.c else abs(b)  # the series form takes P on the error, and adds what b is beyond 1

@@ -167,10 +167,11 @@ class Dials:
             return {}
         with suppress(InexactError, ZeroDivisionError):
             solved = _solve(a, [x for x, _ in names], source, path)
-            return {
+            found = {
                 name: exact(from_canonical_exactly(self.settings[name].role, x, parse_unit(self.settings[name].unit), self.spans))
                 for (_, name), x in zip(names, solved, strict=True)
             }
+            return {name: x for name, x in found.items() if x != self.standing.dial(name)}
         return {}
 
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
-from pidemu.certificate.exact_law import ExactLaw, PathName, exact_algorithm, exact_paths
+from pidemu.certificate.exact_law import ExactLaw, PathName, difference, exact_algorithm, exact_paths
 from pidemu.certificate.ideal_dials import Dials
 from pidemu.certificate.law_text import law_text
 from pidemu.certificate.models import EXACT
@@ -210,7 +210,7 @@ def _names(both: tuple[Algorithm, Algorithm], mode: Mode) -> Iterator[PathName]:
 
 
 def _proof(source: _Exactly, standing: _Exactly) -> Proof:
-    residuals = {name: law.distance(standing.laws[name]) for name, law in source.laws.items()}
+    residuals = {name: _residual(source, standing, name) for name in source.laws}
     target, reachable = _best(source, standing, residuals)
     paths = tuple(
         PathProof(name, law.equals(target.laws[name]), residuals[name], source.text(name), target.text(name))
@@ -230,33 +230,41 @@ def _proof(source: _Exactly, standing: _Exactly) -> Proof:
     )
 
 
+def _residual(source: _Exactly, target: _Exactly, name: PathName) -> float:
+    if source.laws[name].equals(target.laws[name]):
+        return 0.0
+    return difference(source.algorithm, target.algorithm, name, source.factor) or math.ulp(0.0)
+
+
 def _best(source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float]) -> tuple[_Exactly, set[PathName]]:
     """Return the target with the exact dials that make most paths the same, and the paths that any dials, near or not, make so."""
     best, score = standing, [law.equals(standing.laws[name]) for name, law in source.laws.items()]
     reachable: set[PathName] = set()
     if all(score) or residuals["feedback"] > _NEARLY:
         return best, reachable
-    tolerance = _NEARLY if max(residuals.values()) < _SAME_LAW else _ROUNDING
-    for dials in _proposals(source, standing, residuals):
+    for dials, left in _proposals(source, standing, residuals):
         algorithm = exact_algorithm(standing.settings, dials)
         laws = exact_paths(algorithm, tuple(source.laws))
         found = [law.equals(laws[name]) for name, law in source.laws.items()]
         reachable |= {name for name, same in zip(source.laws, found, strict=True) if same and found[0]}
-        if found[0] and sum(found) > sum(score) and _is_near(standing.settings, dials, tolerance):
+        near = _is_near(standing.settings, dials, _NEARLY if left < _SAME_LAW else _ROUNDING)
+        if found[0] and sum(found) > sum(score) and near:
             best, score = _Exactly(standing.settings, algorithm, standing.factor, laws, dials), found
     return best, reachable
 
 
-def _proposals(source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float]) -> Iterator[dict[str, Exact]]:
-    """Yield exact dials for the feedback path, each also with the weights that the setpoint paths need."""
+def _proposals(
+    source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float]
+) -> Iterator[tuple[dict[str, Exact], float]]:
+    """Yield exact dials for the feedback path, each also with the weights that the setpoint paths need, and what floats leave."""
     solver = Dials(standing.settings)
     for dials in [{}] if residuals["feedback"] == 0 else solver.feedback(source.laws["feedback"]):
         if dials:
-            yield dials
+            yield dials, residuals["feedback"]
         for name, law in source.laws.items():
             weights = solver.weights(law, name, dials) if name != "feedback" and residuals[name] < _NEARLY else {}
             if weights:
-                yield dials | weights
+                yield dials | weights, max(residuals["feedback"], residuals[name])
 
 
 def _is_near(target: Settings, dials: Mapping[str, Exact], tolerance: float) -> bool:
@@ -307,5 +315,5 @@ def _lines(proof: Proof) -> Iterator[str]:
         if path.equal:
             yield "  These are the same function: the cross products of numerator and denominator agree term by term."
         else:
-            yield f"  These differ: by {path.residual:.2g} of the coefficients where they differ most."
+            yield f"  These are not the same function: coefficients differ by up to {path.residual:.2g} of their size."
     yield from proof.notes
