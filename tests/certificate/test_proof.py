@@ -16,11 +16,13 @@ from sympy.parsing.sympy_parser import convert_xor, implicit_multiplication, par
 
 import pidemu
 from pidemu.certificate.linear import certify
+from pidemu.certificate.models import EXACT
 from pidemu.certificate.proof import Proof, prove
 from pidemu.errors import ConversionRefusedError, SettingError
 from pidemu.settings import Settings
 from tests.conversion.support import needed, settings_that_act
-from tests.conversion.test_exact import EXACT, FEEDBACK, Pair
+from tests.conversion.test_exact import EXACT as EXACT_PAIRS
+from tests.conversion.test_exact import FEEDBACK, Pair
 from tests.conversion.test_options import CARDS, SOURCES
 from tests.helpers import made_up_card
 
@@ -95,7 +97,7 @@ def test_a_double_root_is_proven_though_floats_lose_half_their_digits_there() ->
     assert {k: v for k, v in proof.dials.items() if k in ("K", "Ti", "Td")} == {"K": "7/10 %/%", "Ti": "10 s", "Td": "10 s"}
 
 
-@pytest.mark.parametrize("pair", [*EXACT, *FEEDBACK], ids=str)
+@pytest.mark.parametrize("pair", [*EXACT_PAIRS, *FEEDBACK], ids=str)
 def test_every_pair_that_is_exact_is_proven(pair: Pair) -> None:
     source = of(pair.source, **pair.given)
     conversion = pidemu.convert(source, pair.target, options=pair.options, given=pair.dials, emulate=False)
@@ -110,7 +112,7 @@ def test_every_pair_that_is_exact_is_proven(pair: Pair) -> None:
 @settings(max_examples=150)
 def test_the_proof_agrees_with_the_comparison_of_floats_over_all_pairs_of_cards(data: st.DataObject) -> None:
     conversion = converted(data)
-    proof = prove(conversion.source, conversion.settings, conversion.factor, "auto")
+    proof = prove(conversion.source, conversion.settings, conversion.factor, "auto", EXACT)
     assume(proof.decided)
     floats = certify(conversion.source.law(), conversion.settings.law(), None, conversion.factor)
     assert proof.feedback_equal == floats.feedback.is_exact
@@ -124,7 +126,7 @@ def test_what_is_exact_in_floats_is_decided(data: st.DataObject) -> None:
     conversion = converted(data)
     floats = certify(conversion.source.law(), conversion.settings.law(), None, conversion.factor)
     assume(floats.feedback.is_exact)
-    assert prove(conversion.source, conversion.settings, conversion.factor, "auto").decided
+    assert prove(conversion.source, conversion.settings, conversion.factor, "auto", EXACT).decided
 
 
 def converted(data: st.DataObject) -> pidemu.Conversion:
@@ -230,7 +232,7 @@ def test_filters_before_the_algorithm_are_part_of_the_law() -> None:
     source = of("yokogawa/fieldbus-pid", GAIN=0.6, RESET=8, PV_FTIME=2)
     proof = prove(source, of("emerson/deltav", GAIN=0.6, RESET=8, STRUCTURE=2))
     assert (proof.feedback_equal, proof.equal("setpoint")) == (False, True)
-    assert proof.source_law == "3/5 (1 + 1/(8 s)) 1/(1 + 2 s) = (3/40 + 3/5 s)/(s (1 + 2 s))"
+    assert proof.source_law == "3/5 (1 + 1/(8 s))/(1 + 2 s) = (3/40 + 3/5 s)/(s (1 + 2 s))"
 
 
 def test_filters_on_all_signals_are_drawn_and_multiplied() -> None:
@@ -239,8 +241,8 @@ def test_filters_on_all_signals_are_drawn_and_multiplied() -> None:
     chosen = card.settings(kp=2, ki=0.1, kd=0)
     proof = prove(chosen, chosen)
     assert [p.source for p in proof.paths] == [
-        "(2 + (1/10)/s) 1/(1 + 1/2 s) 1/(1 + 1/10 s) = (1/10 + 2 s)/(s (1 + 3/5 s + 1/20 s^2))",
-        "(2 + (1/10)/s) 1/(1 + 1/2 s) 1/(1 + 3 s) = (1/10 + 2 s)/(s (1 + 7/2 s + 3/2 s^2))",
+        "(2 + (1/10)/s)/((1 + 1/2 s) (1 + 1/10 s)) = (1/10 + 2 s)/(s (1 + 3/5 s + 1/20 s^2))",
+        "(2 + (1/10)/s)/((1 + 1/2 s) (1 + 3 s)) = (1/10 + 2 s)/(s (1 + 7/2 s + 3/2 s^2))",
     ]
     assert_checks_by_hand(proof)
 
@@ -250,6 +252,24 @@ def test_the_multiplier_decides_about_a_filter_by_ratio() -> None:
     conversion = pidemu.convert(source, "bailey/fc19", emulate=False)
     proof = prove(source, conversion.settings, conversion.factor)
     assert proof.feedback_equal == conversion.certificate.feedback.is_exact
+
+
+def test_a_filter_before_pi_is_a_negative_derivative_behind_the_same_filter() -> None:
+    source = of("yokogawa/fieldbus-pid", GAIN=0.6, RESET=8, PV_FTIME=2)
+    # 0.075 + 0.6 s over s (1 + 2 s): kp = 0.6 - 0.075 x 2, kd = -0.45 x 2
+    for kd in (-0.9, -0.9 * (1 + 4e-16)):
+        proof = prove(source, of("mathworks/pid2", Kp=0.45, Ki=0.075, Kd=kd, Tf=2))
+        assert proof.feedback_equal
+        assert proof.dials["Kd"] == "-9/10 s"
+        assert_checks_by_hand(proof)
+
+
+def test_dials_that_a_search_found_stand_for_exact_ones_a_little_away() -> None:
+    source = of("ardupilot/ac-pid", P=1.252988244845353, IMAX=5.0, FLTE=0.15915494309189535, FLTD=0.0031830988618379067)
+    searched = of("mathworks/pid2", Kp=1.252988244845353, Kd=-1.2529882448452, Tf=1 - 2e-13)
+    strict, wide = prove(source, searched), prove(source, searched, within=EXACT)
+    assert (strict.decided, strict.feedback_equal) == (True, False)
+    assert (wide.decided, wide.feedback_equal) == (True, True)
 
 
 def test_two_pi_is_named_where_a_filter_is_a_frequency() -> None:

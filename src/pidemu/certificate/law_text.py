@@ -52,7 +52,10 @@ def _drawn(equation: Equation, a: Algorithm, path: PathName) -> str:
     else:
         inner = _sum(b, _integral(ki / kp), _derivative(kd / kp * c, filter_time))
         core = f"{_first(kp)} ({inner})" if inner != "1" else str(kp)
-    return " ".join([core, *lags])
+    if not lags:
+        return core
+    core = f"({core})" if "/" in core and " " not in core else core
+    return f"{core}/{lags[0]}" if len(lags) == 1 else f"{core}/({' '.join(lags)})"
 
 
 def _sum(constant: Exact, integral: str, derivative: str) -> str:
@@ -70,14 +73,14 @@ def _derivative(gain: Exact, Tf: Exact) -> str:
 
 
 def _lags(a: Algorithm, setpoint: bool) -> list[str]:
-    """Return the filters that multiply a path."""
+    """Return the filters that a path is divided by."""
     found = []
     if a.filter_on == "output" or (a.filter_on == "measurement" and not setpoint):
         Tf = exact(a.Tf)
         second = f" + {_number(Tf * Tf / 2)} s^2" if a.filter_order == 2 and a.filter_on == "measurement" else ""
-        found += [f"1/(1 + {_rate(Tf)}{second})"] if Tf else []
+        found += [f"(1 + {_rate(Tf)}{second})"] if Tf else []
     signals: tuple[Lag | None, ...] = (a.e_filter, a.sp_filter if setpoint else a.pv_filter)
-    return [*found, *(f"1/{_lag(exact(lag.time))}" for lag in signals if lag is not None and lag.time)]
+    return [*found, *(_lag(exact(lag.time)) for lag in signals if lag is not None and lag.time)]
 
 
 def _lag(time: Exact) -> str:

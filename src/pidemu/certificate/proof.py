@@ -26,8 +26,8 @@ from pidemu.units import Dimension, parse_unit
 
 Mode = Literal["auto", "cascade", "both"]
 
-_ROUNDING: Final = 1e-14
-"""Relative difference of a dial from an exact one that is the rounding of a few operations in double."""
+ROUNDING: Final = 1e-13
+"""Relative difference of a dial from an exact one that is the rounding of some hundred operations in double."""
 _SAME_LAW: Final = 4e-15
 """Difference of all coefficients that is the same: where a dial hangs on the others by a root or a difference of nearly equal
 numbers, it is wrong by more than its rounding, the law is not."""
@@ -163,7 +163,7 @@ class _Exactly:
         return law_text(self.settings.equation, self.algorithm, name, self.laws[name], self.factor)
 
 
-def prove(source: Settings, target: Settings, factor: Fraction | float = 1, mode: Mode = "both") -> Proof:
+def prove(source: Settings, target: Settings, factor: Fraction | float = 1, mode: Mode = "both", within: float = ROUNDING) -> Proof:
     """Decide without rounding whether two controllers have the same continuous law.
 
     Parameters
@@ -174,6 +174,9 @@ def prove(source: Settings, target: Settings, factor: Fraction | float = 1, mode
         What the source's gain is multiplied by for new signal ranges; negative where the action changes.
     mode : {"auto", "cascade", "both"}
         In which mode setpoint changes are looked at.
+    within : float
+        How far, relatively, a dial of the target may lie from the exact one that it stands for. By default by rounding alone;
+        for dials that a conversion computed `pidemu.certificate.models.EXACT`, since a search ends before the last digit.
 
     Returns
     -------
@@ -196,7 +199,7 @@ def prove(source: Settings, target: Settings, factor: Fraction | float = 1, mode
         both = exact_algorithm(source), exact_algorithm(target)
         names = tuple(_names(both, mode))
         own = _Exactly(source, both[0], scale, exact_paths(both[0], names, scale))
-        return _proof(own, _Exactly(target, both[1], Exact(1), exact_paths(both[1], names)))
+        return _proof(own, _Exactly(target, both[1], Exact(1), exact_paths(both[1], names)), within)
     except (PidemuError, ArithmeticError) as error:
         return Proof(source.card.id, target.card.id, decided=False, why_not=str(error))
 
@@ -209,9 +212,9 @@ def _names(both: tuple[Algorithm, Algorithm], mode: Mode) -> Iterator[PathName]:
         yield "setpoint in cascade"
 
 
-def _proof(source: _Exactly, standing: _Exactly) -> Proof:
+def _proof(source: _Exactly, standing: _Exactly, within: float) -> Proof:
     residuals = {name: _residual(source, standing, name) for name in source.laws}
-    target, reachable = _best(source, standing, residuals)
+    target, reachable = _best(source, standing, residuals, within)
     paths = tuple(
         PathProof(name, law.equals(target.laws[name]), residuals[name], source.text(name), target.text(name))
         for name, law in source.laws.items()
@@ -236,7 +239,9 @@ def _residual(source: _Exactly, target: _Exactly, name: PathName) -> float:
     return difference(source.algorithm, target.algorithm, name, source.factor) or math.ulp(0.0)
 
 
-def _best(source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float]) -> tuple[_Exactly, set[PathName]]:
+def _best(
+    source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float], within: float
+) -> tuple[_Exactly, set[PathName]]:
     """Return the target with the exact dials that make most paths the same, and the paths that any dials, near or not, make so."""
     best, score = standing, [law.equals(standing.laws[name]) for name, law in source.laws.items()]
     reachable: set[PathName] = set()
@@ -247,7 +252,7 @@ def _best(source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, flo
         laws = exact_paths(algorithm, tuple(source.laws))
         found = [law.equals(laws[name]) for name, law in source.laws.items()]
         reachable |= {name for name, same in zip(source.laws, found, strict=True) if same and found[0]}
-        near = _is_near(standing.settings, dials, _NEARLY if left < _SAME_LAW else _ROUNDING)
+        near = _is_near(standing.settings, dials, _NEARLY if left < _SAME_LAW else within)
         if found[0] and sum(found) > sum(score) and near:
             best, score = _Exactly(standing.settings, algorithm, standing.factor, laws, dials), found
     return best, reachable
