@@ -122,11 +122,12 @@ def test_the_proof_agrees_with_the_comparison_of_floats_over_all_pairs_of_cards(
 
 @given(data=st.data())
 @settings(max_examples=60)
-def test_what_is_exact_in_floats_is_decided(data: st.DataObject) -> None:
+def test_what_is_exact_in_floats_is_proven_on_the_feedback_path(data: st.DataObject) -> None:
+    # the setpoint path may stay open, where a setpoint filter in Hz cancels a zero: 2 pi is no fraction
     conversion = converted(data)
     floats = certify(conversion.source.law(), conversion.settings.law(), None, conversion.factor)
     assume(floats.feedback.is_exact)
-    assert prove(conversion.source, conversion.settings, conversion.factor, "auto", EXACT).decided
+    assert prove(conversion.source, conversion.settings, conversion.factor, "auto", EXACT).feedback_equal
 
 
 def converted(data: st.DataObject) -> pidemu.Conversion:
