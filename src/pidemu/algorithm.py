@@ -316,7 +316,7 @@ class Algorithm:
     @property
     def derivative_per_gain(self) -> float:
         """``kd/kp`` [s]: the derivative time that the integral of the series form sees."""
-        none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
+        none = getattr(self.kd, "ndim", 0) == 0 and not self.kd  # the numbers may be arrays
         return 0.0 if none else self.kd / self.kp
 
     def too_coarse(self, h: float) -> list[str]:

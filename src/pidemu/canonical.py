@@ -35,7 +35,7 @@ def gain_sign(equation: Equation) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class Reader:
     """Reads a card's dials and numbers in canonical units, or in the controller's own."""
 
     settings: Settings
@@ -58,6 +58,15 @@ class _Reader:
         """Return a deadband of the output, which a dial for one of the measurement may hold too; 0 where there is none."""
         return replace(self, spans=replace(self.spans, pv=self.spans.op)).pick(given, 0.0)
 
+    def number(self, x: float) -> float:
+        """Return a constant of the card."""
+        return x
+
+    @property
+    def span_ratio(self) -> float:
+        """Percent gain that one output unit per measurement unit amounts to [%/%]."""
+        return float(self.spans.ratio)
+
     def role(self, role: Role, default: float) -> float:
         """Return the canonical value of the dial that sets `role`."""
         value = self.settings.by_role(role)
@@ -67,16 +76,21 @@ class _Reader:
         """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
         if isinstance(given, str):
             return default if self.settings[given].off else self.value(given)
-        return default if given is None else given
+        return default if given is None else self.number(given)
 
 
 def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
+    own = own_units and settings.equation.signals == "engineering"
+    interval = default_scan(settings.equation) if scan is None else scan
+    return algorithm_as_read(Reader(settings, replace(Spans() if own else settings.spans, scan=interval), own), interval)
+
+
+def algorithm_as_read(read: Reader, scan: float | None = None) -> Algorithm:
+    """Return the algorithm with its numbers as a reader reads them: floats, or without rounding."""
+    settings = read.settings
     equation = settings.equation
     engineering = equation.signals == "engineering"
-    own = own_units and engineering
-    interval = default_scan(equation) if scan is None else scan
-    read = _Reader(settings, replace(Spans() if own else settings.spans, scan=interval), own)
     form = equation.form
     gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
     scale = read.role(Role.MULTIPLIER, 1.0)
@@ -84,7 +98,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     time = read.role(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
     if form is Form.PARALLEL:
         kp = gain * scale
-        scale *= float(read.spans.ratio) if engineering else 1.0
+        scale *= read.span_ratio if engineering else 1.0
         scale *= gain_sign(equation)
         ki, kd = rate * scale, time * scale
     else:
@@ -129,7 +143,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
         bias=read.role(Role.BIAS, 0.0),
         dahlin=_dahlin(read) if form is Form.DAHLIN else None,
         **_transfer(equation),
-        **_signals(read, equation, interval),
+        **_signals(read, equation, default_scan(equation) if scan is None else scan),
         **_output(read, equation),
     )
 
@@ -147,13 +161,13 @@ def _some(value: float) -> float | None:
     return value if value else None
 
 
-def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
+def _weight(read: Reader, on: str, weight: str | float | None) -> float:
     if on != "weighted":
         return float(on == "error")
-    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
+    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else read.number(weight)
 
 
-def _filter(read: _Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
+def _filter(read: Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
     """Return the filter's time [s], place and order (specs/equations.md, section 1)."""
     if filt is None:
         return 0.0, "term", 1
@@ -175,7 +189,7 @@ def _filter(read: _Reader, filt: Filter | None, rate: float, time: float, kp: fl
     return base * read.pick(filt.ratio, 0.0), place, filt.order
 
 
-def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: float, kd: float) -> float:
+def _filter_base(read: Reader, filt: Filter, rate: float, time: float, kp: float, kd: float) -> float:
     """Return the derivative time that the filter's ratio or gain refers to [s].
 
     Raises
@@ -195,7 +209,7 @@ def _filter_base(read: _Reader, filt: Filter, rate: float, time: float, kp: floa
     return kd / kp
 
 
-def _gate(read: _Reader, equation: Equation) -> Gate:
+def _gate(read: Reader, equation: Equation) -> Gate:
     match equation.integral.windup:
         case WindupGate() as w:
             return Gate(
@@ -215,14 +229,14 @@ def _gate(read: _Reader, equation: Equation) -> Gate:
     return Gate()
 
 
-def _level(read: _Reader, given: str | float, default: float) -> float:
+def _level(read: Reader, given: str | float, default: float) -> float:
     """Return a level of the output [%]: a level in engineering units counts from the low end of the range."""
-    level, low = read.pick(given, default), (read.settings.op_range or (0.0, 0.0))[0]
+    level, low = read.pick(given, default), read.settings.op_range.low if read.settings.op_range is not None else 0.0
     in_units = isinstance(given, str) and parse_unit(read.settings[given].unit).dimension is Dimension.PV_UNITS
     return level - 100 * low / read.spans.op if in_units and read.settings.equation.signals == "percent" else level
 
 
-def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
+def _tracking(read: Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
     """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
     parallel = read.settings.equation.form is Form.PARALLEL
     integral_time = abs(kp / ki if parallel and kp else 1 / rate)
@@ -240,7 +254,7 @@ def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd:
     return found * integral_time if windup.times == "Ti" else found
 
 
-def _integral_limits(read: _Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
+def _integral_limits(read: Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
     if limits is None:
         return None
 
@@ -271,7 +285,7 @@ def _transfer(equation: Equation) -> dict[str, Any]:
     }
 
 
-def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
+def _lag(read: Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
     """Return a signal's filter, or ``None`` where there is none or it is off."""
     filt = None if signal is None else signal.filter
     if filt is None:
@@ -282,10 +296,10 @@ def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: f
     factor = read.pick(filt.factor, 1.0)
     if not 0 < factor <= 1:
         raise SettingError(f"{read.settings.card.id}: {filt.factor} is {factor:g}; a share of the new sample is above 0, up to 1")
-    return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
+    return Lag(read.number(h) * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
 
 
-def _shape(read: _Reader, equation: Equation) -> Shape | None:
+def _shape(read: Reader, equation: Equation) -> Shape | None:
     """Return what is done to the error, or ``None`` where that is nothing; P on the measurement itself is no error."""
     error = equation.error
     if error is None or error.shape == "linear":
@@ -310,7 +324,7 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
     )
 
 
-def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
+def _signals(read: Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
     cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
@@ -333,7 +347,7 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     }
 
 
-def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
+def _output(read: Reader, equation: Equation) -> dict[str, Any]:
     arithmetic = equation.arithmetic
     numbers: dict[str, Any] = {
         "output_rate": read.pick(equation.output.rate, math.inf),
@@ -350,7 +364,7 @@ def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
     return numbers
 
 
-def _dahlin(read: _Reader) -> Dahlin:
+def _dahlin(read: Reader) -> Dahlin:
     found = Dahlin(
         gain=read.role(Role.PROCESS_GAIN, 1.0),
         time=read.role(Role.PROCESS_TIME, 0.0),

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 from pidemu.errors import UnitError, suggest
 
@@ -384,6 +384,17 @@ def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) ->
     inf
     """
     return _convert(role, value, unit, spans, inward=False)
+
+
+def to_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> Any:
+    """Return the canonical value of a finite dial without rounding, for a fraction or a `pidemu.exact_numbers.Exact`."""
+    check_unit(role, unit)
+    return _inward(role, value, unit, spans)
+
+
+def from_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> Any:
+    """Return the dial value of a canonical one without rounding; the inverse of `to_canonical_exactly`."""
+    return _outward(role, value, unit, spans)
 
 
 def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:

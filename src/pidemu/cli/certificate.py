@@ -79,6 +79,11 @@ def print_conversion(c: Conversion) -> None:
     _textbook(c)
     if c.certificate.loop is not None:
         _loop(c.certificate.loop)
+    proof = c.certificate.proof
+    if proof is not None and proof.decided and proof.feedback_equal:
+        heading("\nProof")
+        for line in proof.text:
+            wrapped(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
 
 
 def condition_line(condition: object) -> str:

@@ -25,6 +25,7 @@ from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
+    from pidemu.certificate.proof import Proof
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
@@ -111,6 +112,11 @@ class Conversion:
         if self.certificate.setpoint_in_cascade is not None:
             return {mode: self.certificate.verdict_in(mode) for mode in MODES}
         return {self.request.mode: self.verdict}
+
+    @property
+    def proof(self) -> Proof | None:
+        """Both laws compared without rounding; ``None`` where they are not the same anyway, or where the scans were made up for."""
+        return self.certificate.proof
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
