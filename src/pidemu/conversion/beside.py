@@ -65,7 +65,7 @@ def runner_up(c: Conversion) -> Beside | None:
         torn = best.merit.setpoint >= _TORN and other.merit.setpoint >= _TORN  # neither keeps the setpoint path
         same_class = RANK[other.verdict] <= RANK[best.verdict] and other.merit.setpoint == best.merit.setpoint
         if torn or (same_class and not other.merit.unused and other.merit.nonlinear == best.merit.nonlinear):
-            return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(other))
+            return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(best, other))
         return None
     return None
 
@@ -85,9 +85,10 @@ def _runner_up_text(best: Attempt, other: Attempt) -> str:
     return f"{options}: {verdict}, {_dials(other.settings)}"
 
 
-def _set(other: Attempt) -> str:
+def _set(best: Attempt, other: Attempt) -> str:
     assert other.settings is not None
-    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in other.settings.options.items())
+    chosen = {n: x for n, x in other.settings.options.items() if n in other.changed or n in best.changed}
+    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in chosen.items())
 
 
 def _is_another(a: Settings, b: Settings) -> bool:

@@ -31,6 +31,8 @@ _DISTANCE: Final = {
 }  # fmt: skip
 """How far a form is from another, to somebody who knows the dials of the first."""
 _TERMS: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+_UNBOUNDED: Final = 1000
+"""Distance of noise gains of which one is nothing beside the other."""
 _DIAL: Final = 1e-6
 """Relative difference from which a dial is another one."""
 _SURE_ROUNDING: Final = 5e-4
@@ -161,7 +163,7 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         rules=rules_differ(source, settings),
         assumed=_assumed(settings),
         windup=a.windup != b.windup,
-        noise=0 if exact or not math.isfinite(ratio) or not ratio else round(abs(math.log(ratio)) * 10),
+        noise=0 if exact else _noise_steps(ratio),
         derivative=not b.kd and settings.equation.derivative.on not in ("pv", "none"),
         rounding=_coarse(rounding_error(settings)),
         units=_other_units(source, settings),
@@ -246,6 +248,10 @@ def _noise(work: Solver, settings: Settings) -> float:
     if math.isinf(before):
         return 1.0
     return noise_gain(settings, new) / before if before else math.inf
+
+
+def _noise_steps(ratio: float) -> int:
+    return _UNBOUNDED if not 0 < ratio < math.inf else round(abs(math.log(ratio)) * 10)
 
 
 def _assumed(settings: Settings) -> int:
