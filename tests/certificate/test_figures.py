@@ -21,6 +21,7 @@ from pidemu.certificate.models import Kick, PathComparison
 from pidemu.cli import cli
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
+from tests.checks.bench import edited
 from tests.conversion.support import Floats, continuous, difference, settings_that_act
 from tests.helpers import made_up_card
 
@@ -125,22 +126,33 @@ def test_the_time_scale_of_every_kind_of_controller(card: str, dials: dict[str, 
 
 
 def test_the_two_scans_are_those_of_source_and_target_in_that_order() -> None:
-    conversion = convert("fisher/provox", PROVOX, "generic/parallel", scan=(2.0, 0.5), compensate=False)
+    conversion = convert("fisher/provox", PROVOX, "generic/parallel", scan=(0.5, 2.0))
     at_scan = conversion.certificate.feedback_at_scan
     assert at_scan is not None
     w = np.geomspace(at_scan.loop_band.low, at_scan.loop_band.high, 300)
-    hold = [(1 - np.exp(-1j * w * h)) / (1j * w * h) for h in (2.0, 0.5)]  # as a process sees them
-    ratio = conversion.settings.law(0.5).response(w) * hold[1] / (conversion.source.law(2.0).response(w) * hold[0])
+    hold = [(1 - np.exp(-1j * w * h)) / (1j * w * h) for h in (0.5, 2.0)]  # as a process sees them
+    ratio = conversion.settings.law(2.0).response(w) * hold[1] / (conversion.source.law(0.5).response(w) * hold[0])
     assert at_scan.loop_band.max_deviation == pytest.approx(float(np.max(np.abs(ratio - 1))))
     assert conversion.certificate.feedback.is_exact
-    assert conversion.verdict == "approximate"
-    assert conversion.scan == (2.0, 0.5)
+    assert conversion.scan == (0.5, 2.0)
     one = convert("fisher/provox", PROVOX, "generic/parallel", scan=2.0)
     assert one.scan == (2.0, 2.0)
     assert one.verdict == "exact"
     none = convert("fisher/provox", PROVOX, "generic/parallel")
     assert none.certificate.feedback_at_scan is None
     assert none.verdict == "exact"
+
+
+def test_a_scan_that_costs_phase_makes_it_approximate_and_one_that_gains_phase_leaves_it_exact() -> None:
+    """The sign counts: what is lost one way is gained the other."""
+    slower = convert("fisher/provox", PROVOX, "generic/parallel", scan=(0.5, 2.0))
+    faster = convert("fisher/provox", PROVOX, "generic/parallel", scan=(2.0, 0.5))
+    costs = [c.certificate.scan_cost for c in (slower, faster)]
+    assert all(cost is not None and cost.at == pytest.approx(2 / 20.25) for cost in costs)  # 2/Te, Te = m1/m0
+    lost = [cost.phase_deg for cost in costs if cost is not None]
+    assert lost[0] == pytest.approx(-lost[1])
+    assert lost[0] > 1
+    assert (slower.verdict, faster.verdict) == ("approximate", "exact")
 
 
 VERDICTS = [
@@ -150,7 +162,7 @@ VERDICTS = [
     ("fisher/provox", PROVOX, "emerson/deltav", {"given": {"ALPHA": 0.125}}, "approximate"),
     ("fisher/provox", PROVOX, "emerson/deltav", {"match": "textbook"}, "approximate"),
     ("fisher/provox", {"GAIN": 2, "RESET": 4}, "emerson/deltav", {"match": "textbook"}, "exact"),
-    ("fisher/provox", PROVOX, "emerson/deltav", {"options": {"STRUCTURE": "7"}, "scan": (1.0, 0.5)}, "approximate"),
+    ("fisher/provox", PROVOX, "emerson/deltav", {"options": {"STRUCTURE": "7"}, "scan": (1.0, 0.5)}, "exact"),
 ]
 
 
@@ -162,10 +174,10 @@ def test_the_verdict_follows_from_the_figures(
     c = conversion.certificate
     assert conversion.verdict == verdict
 
-    def largest(*paths: PathComparison | None) -> float:
-        return max(max(p.loop_band.max_deviation, p.full_band.max_deviation) for p in paths if p is not None)
+    def largest(path: PathComparison) -> float:
+        return max(path.loop_band.max_deviation, path.full_band.max_deviation)
 
-    feedback, setpoint = largest(c.feedback, c.feedback_at_scan), largest(c.setpoint, c.setpoint_at_scan)
+    feedback, setpoint = largest(c.feedback), largest(c.setpoint)  # scans are judged apart, by the phase that they cost
     assert (feedback < 1e-9) == (verdict != "approximate")
     assert (feedback < 1e-9 and setpoint < 1e-9) == (verdict == "exact")
 
@@ -177,16 +189,16 @@ def test_the_textbook_rule_enlarges_the_setpoint_kick_by_one_plus_Td_over_Ti() -
     assert (kick.source, kick.target) == pytest.approx((2, 2 * (1 + 6 / 15)))
     assert kick.ratio == pytest.approx(1.4)
     assert any(
-        "the output jumps by 2.8 % per % at once, on the source it jumps by 2 % per % at once (1.4 times)" in w
+        "with the old controller the output jumps by 2 % per % at once, with the new one it jumps by 2.8 % per % at once" in w
         for w in conversion.warnings
     )
 
 
 def test_a_setpoint_weight_keeps_the_kick() -> None:
-    conversion = convert("fisher/provox", PROVOX, "emerson/deltav", options={"STRUCTURE": "7"})
+    options = {"FORM": "Standard", "STRUCTURE": "7"}
+    conversion = convert("fisher/provox", PROVOX, "emerson/deltav", options=options)
     assert conversion.certificate.setpoint_kick.ratio == pytest.approx(1, rel=1e-12)
     assert conversion.settings["BETA"].value == pytest.approx(15 / (15 + 0.875 * 6))
-    options = {"FORM": "Standard", "STRUCTURE": "7"}
     held = convert("fisher/provox", PROVOX, "emerson/deltav", options=options, given={"BETA": 1})
     assert held.certificate.setpoint_kick.ratio == pytest.approx(1.35)
 
@@ -214,7 +226,7 @@ def test_the_ratio_of_kicks_that_are_nothing_or_infinite(kick: Kick, ratio: floa
 
 
 def test_the_kick_is_the_first_move_of_the_emulated_controller() -> None:
-    conversion = convert("bailey/fc18", {"KP": 2, "KI": 0.5, "KD": 0.1}, "emerson/deltav")
+    conversion = convert("bailey/fc18", {"KP": 2, "KI": 0.5, "KD": 0.1, "pv_range": (0, 100)}, "emerson/deltav")
     kick = conversion.certificate.setpoint_kick
     h = 1e-4
     moves = []
@@ -276,8 +288,8 @@ class TestRescaling:
 
     def test_a_warning_says_so(self) -> None:
         assert self.convert("generic/parallel").warnings[:2] == (
-            "PV range: 0 to 100 degC becomes 50 to 250 degC, so the gain in percent is multiplied by 2",
-            "output range: 0 to 80 kg/h becomes 0 to 100 kg/h, so the gain in percent is multiplied by 0.8",
+            "PV range: 0 to 100 degC becomes 50 to 250 degC, so the gain in percent is multiplied by 2.",
+            "Output range: 0 to 80 kg/h becomes 0 to 100 kg/h, so the gain in percent is multiplied by 0.8.",
         )
 
     def test_the_same_ranges_change_nothing(self) -> None:
@@ -290,7 +302,7 @@ class TestRescaling:
 class TestRounding:
     """The UDC shows hundredths of a minute."""
 
-    SOURCE: ClassVar = {"GAIN": 2, "RESET": 55.1, "RATE": 7.3}
+    SOURCE: ClassVar = {"GAIN": 2, "RESET": 55.1, "RATE": 7.3, "FORM": "Standard"}
 
     def test_nothing_is_rounded_unasked(self) -> None:
         conversion = convert("emerson/deltav", self.SOURCE, "honeywell/udc")
@@ -300,7 +312,7 @@ class TestRounding:
 
     def test_on_request_the_dials_are_rounded_and_the_effect_is_stated(self) -> None:
         exact = convert("emerson/deltav", self.SOURCE, "honeywell/udc")
-        conversion = convert("emerson/deltav", self.SOURCE, "honeywell/udc", round_dials=True)
+        conversion = convert("emerson/deltav", self.SOURCE, "honeywell/udc", digits=5)
         assert conversion.settings["RSET"].value == 0.92
         assert conversion.settings["RATE"].value == 0.12
         assert conversion.settings["GAIN"].value == exact.settings["GAIN"].value  # no resolution stated
@@ -313,20 +325,19 @@ class TestRounding:
         assert c.feedback.loop_band.max_deviation == pytest.approx(float(np.max(np.abs(ratio - 1))), rel=1e-6)
 
     def test_dials_that_need_no_rounding_are_not_named(self) -> None:
-        conversion = convert("emerson/deltav", {"GAIN": 2, "RESET": 60, "RATE": 6}, "honeywell/udc", round_dials=True)
+        conversion = convert("emerson/deltav", self.SOURCE | {"RESET": 60, "RATE": 6}, "honeywell/udc", digits=5)
         assert conversion.certificate.dials == ()
 
     def test_rounding_makes_an_exact_conversion_approximate(self, tmp_path: Path) -> None:
         text = (Path(__file__).parents[2] / "vendors/generic/standard.yaml").read_text(encoding="utf-8")
-        changed = text.replace("K: {sets: gain, ", "K: {sets: gain, resolution: 0.5, ", 1)
-        assert changed != text
+        changed = edited(text, ("K: {sets: gain, ", "K: {sets: gain, resolution: 0.5, "), ("vendor: Generic", "vendor: Acme"))
         file = tmp_path / "acme" / "coarse.yaml"
         file.parent.mkdir()
         file.write_text(changed, encoding="utf-8")
         card = pidemu.load_card("acme/coarse", [tmp_path])
         source = pidemu.load_card("generic/standard").settings(K=2.2, Ti=60)
         assert pidemu.convert(source, card).verdict == "exact"
-        rounded = pidemu.convert(source, card, round_dials=True)
+        rounded = pidemu.convert(source, card, digits=5)
         assert rounded.verdict == "approximate"
         assert rounded.settings["K"].value == 2.0
         assert rounded.certificate.feedback.loop_band.max_deviation == pytest.approx(1 - 2 / 2.2)
@@ -355,20 +366,21 @@ def test_the_json_answer_has_the_shape_that_stays() -> None:
     assert isinstance(source, dict)
     assert isinstance(certificate, dict)
     assert goal["card"] == "emerson/deltav"
-    assert goal["options"] == {"FORM": "Standard", "STRUCTURE": "7", "FRSIPID_OPTS": "none"}
-    assert answer["chosen"] == {"STRUCTURE": "7"}
-    assert goal["settings"]["RESET"] == {"value": pytest.approx(20.25), "unit": "s/repeat"}
+    assert goal["options"] == {"FORM": "Series", "STRUCTURE": "1", "FRSIPID_OPTS": "none"}
+    assert answer["chosen"] == {"FORM": "Series"}
+    assert goal["settings"]["RATE"] == {"value": 5.25, "unit": "s", "unrounded": pytest.approx(5.25, rel=1e-12)}
+    assert goal["settings"]["ALPHA"] == {"value": 0.14286, "unit": "1", "unrounded": pytest.approx(1 / 7, rel=1e-12)}
     assert source["settings"]["RESET"] == {"value": 4.0, "unit": "repeat/min"}
     for path in ("feedback", "setpoint", "feedback_at_scan", "setpoint_at_scan"):
         for band in ("loop_band", "full_band"):
             assert {"max_deviation", "gain_db", "phase_deg", "low", "high", "worst_at"} <= set(certificate[path][band])
-    assert answer["verdict"] == "approximate"
+    assert answer["verdict"] == "exact"  # the new block scans faster, which costs no phase
     assert answer["scan"] == [1.0, 0.5]
     assert isinstance(answer["warnings"], list)
 
 
 def test_the_json_answer_says_what_the_library_says() -> None:
-    conversion = convert("fisher/provox", PROVOX, "emerson/deltav")
+    conversion = convert("fisher/provox", PROVOX, "emerson/deltav", digits=5)
     code, answer = run_json("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav")
     assert code == 0
     assert answer == json.loads(json.dumps(conversion.to_dict()))
@@ -396,9 +408,9 @@ def test_a_refusal_in_json_has_the_reason_and_the_nearest_settings_and_exit_stat
     assert code == 1
     assert answer["verdict"] == "refused"
     assert "complex zeros" in str(answer["reason"])
-    goal = answer["to"]
-    assert isinstance(goal, dict)
-    assert set(goal["settings"]) == {"K", "Ti", "Td", "alpha"}
+    nearest = answer["nearest"]
+    assert isinstance(nearest, dict)
+    assert set(nearest["to"]["settings"]) == {"K", "Ti", "Td", "alpha"}
 
 
 def test_what_is_assumed_is_listed() -> None:

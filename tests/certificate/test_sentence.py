@@ -22,14 +22,10 @@ from pidemu.certificate.models import (
 )
 from pidemu.certificate.sentence import sentence
 
-EXACT = "The new controller does what the old one did, to load disturbances and to setpoint changes alike."
-FEEDBACK = (
-    "Against disturbances, and in stability, the new controller does exactly what the old one did; "
-    "setpoint changes will look different"
-)
-LITTLE = "That is little beside usual margins."
-WATCH = "A loop with usual margins stays stable, but will look a little different: watch it after the cut-over."
-MUCH = "That is much: expect to tune the loop again."
+EXACT = "The new controller does what the old one did, for disturbances and for setpoint changes."
+FEEDBACK = "For disturbances and in stability, the new controller does what the old one did; setpoint changes differ: "
+SAME = "The two equations are the same; "
+FIRST = "the first move of the output is the same, what follows is not."
 UNSTABLE = "WITH THIS PROCESS THE LOOP WOULD BE UNSTABLE: do not use these settings."
 
 
@@ -52,8 +48,8 @@ def certificate(
     )
 
 
-def run(largest: float, on_measurement: float, size: float = 8.0) -> ScanByScan:
-    return ScanByScan((1.0, 1.0), False, largest, 30.0, "setpoint steps", on_measurement, size)
+def run(largest: float, on_measurement: float, *, same_rules: bool = True, scan: tuple[float, float] = (1.0, 1.0)) -> ScanByScan:
+    return ScanByScan(scan, False, largest, 30.0, "setpoint steps", on_measurement, 8.0, same_rules)
 
 
 def loop(before: bool, after: bool) -> LoopComparison:
@@ -69,114 +65,159 @@ def test_equal_controllers_do_the_same() -> None:
 @pytest.mark.parametrize(
     ("kick", "words"),
     [
-        ((2.0, 2.7), ": a step moves the output at once by 2.7 % per %, before it was 2."),
-        ((2.0, 0.0), ": a step does not move the output at once, before it was 2."),
-        ((0.0, 2.0), ": a step moves the output at once by 2 % per %, before it did not."),
-        ((2.0, math.inf), ": a step spikes the output for one scan, before it was 2."),
-        ((math.inf, 2.0), ": a step moves the output at once by 2 % per %, before it spiked it."),
-        ((0.0, math.inf), ": a step spikes the output for one scan, before it did not."),
-        ((math.inf, 0.0), ": a step does not move the output at once, before it spiked it."),
-        ((math.inf, math.inf), "."),
-        ((2.0, 2.0), "."),
-        ((-2.0, -2.71828), ": a step moves the output at once by -2.72 % per %, before it was -2."),
+        ((2.0, 2.7), "a step of 1 % moves the output at once by 2.7 %; with the old controller it moved it by 2 %."),
+        ((2.0, 0.0), "a step of 1 % does not move the output at once; with the old controller it moved it by 2 %."),
+        ((0.0, 2.0), "a step of 1 % moves the output at once by 2 %; with the old controller it did not."),
+        ((2.0, math.inf), "a step of 1 % spikes the output for one scan; with the old controller it moved it by 2 %."),
+        ((math.inf, 2.0), "a step of 1 % moves the output at once by 2 %; with the old controller it spiked it."),
+        ((0.0, math.inf), "a step of 1 % spikes the output for one scan; with the old controller it did not."),
+        ((math.inf, 0.0), "a step of 1 % does not move the output at once; with the old controller it spiked it."),
+        ((math.inf, math.inf), FIRST),
+        ((2.0, 2.0), FIRST),
+        ((-2.0, -2.71828), "a step of 1 % moves the output at once by -2.72 %; with the old controller it moved it by -2 %."),
     ],
 )
 def test_where_only_the_setpoint_differs_both_kicks_are_named(kick: tuple[float, float], words: str) -> None:
     assert sentence(certificate(setpoint=path(0.3), kick=kick)) == FEEDBACK + words
 
 
-def test_at_the_scans_the_kick_is_the_one_of_the_first_scan() -> None:
-    at_scan: dict[str, Any] = {"feedback_at_scan": path(), "setpoint_at_scan": path(0.3), "setpoint_kick_at_scan": Kick(3.0, 4.0)}
-    found = sentence(certificate(kick=(math.inf, math.inf), **at_scan))
-    assert found == FEEDBACK + ": a step moves the output at once by 4 % per %, before it was 3."
+@pytest.mark.parametrize(
+    ("auto", "cascade", "words"),
+    [
+        (0.0, 0.3, "setpoint changes are the same in automatic and differ in cascade: a step of 1 % moves the output at once by 4 %"),
+        (0.3, 0.0, "setpoint changes are the same in cascade and differ in automatic: a step of 1 % moves the output at once by 2 %"),
+        (0.3, 0.3, "setpoint changes differ: in automatic, a step of 1 % moves the output at once by 2 %; with the old controller it "
+         "did not; in cascade, a step of 1 % moves the output at once by 4 %"),
+    ],
+)  # fmt: skip
+def test_where_the_equation_depends_on_the_mode_each_mode_is_spoken_of(auto: float, cascade: float, words: str) -> None:
+    found = sentence(
+        certificate(setpoint=path(auto), kick=(0.0, 2.0), setpoint_in_cascade=path(cascade), kick_in_cascade=Kick(0.0, 4.0))
+    )
+    begin = "For disturbances and in stability, the new controller does what the old one did; "
+    assert found == f"{begin}{words}; with the old controller it did not."
 
 
-def test_what_counts_is_the_law_at_the_scans_where_there_is_one() -> None:
-    assert sentence(certificate(path(0.3), path(0.3), feedback_at_scan=path(), setpoint_at_scan=path())) == EXACT
-    worse = sentence(certificate(feedback_at_scan=path(0.012, 0.1, 0.5), setpoint_at_scan=path()))
-    assert worse.startswith("The new controller comes within 1.2 % of the old one where the loop works: ")
+def test_settings_that_make_up_for_the_scans_are_judged_at_the_scans() -> None:
+    assert sentence(certificate(path(0.3), path(0.3), feedback_at_scan=path(), setpoint_at_scan=path(), compensated=True)) == EXACT
 
 
-def test_where_an_emulated_setpoint_step_alone_differs_it_is_the_setpoint() -> None:
-    assert sentence(certificate(scan_by_scan=run(3.0, 1e-9))) == FEEDBACK + "."
+def test_plain_settings_are_judged_by_the_continuous_laws() -> None:
+    assert sentence(certificate(feedback_at_scan=path(0.3), setpoint_at_scan=path(0.3))) == EXACT
 
 
 @pytest.mark.parametrize(
-    ("gain_db", "phase_deg", "advice"),
-    [
-        (0.0, 0.0, LITTLE),
-        (0.6, 3.0, LITTLE),  # a tenth of 6 dB and 30 degrees
-        (0.61, 3.0, WATCH),
-        (0.6, 3.1, WATCH),
-        (2.0, 10.0, WATCH),  # a third
-        (2.1, 1.0, MUCH),
-        (0.1, 10.1, MUCH),
-        (math.inf, 180.0, MUCH),
-    ],
+    ("gain_db", "phase_deg", "words"),
+    [(0.6, 3.0, "0.6 dB and its phase by up to 3 degrees"), (2.14159, 10.4567, "2.14 dB and its phase by up to 10.5 degrees")],
 )
-def test_an_approximate_one_is_judged_by_usual_margins(gain_db: float, phase_deg: float, advice: str) -> None:
-    assert sentence(certificate(path(0.1234, gain_db, phase_deg))) == (
-        "The new controller comes within 12 % of the old one where the loop works: up to "
-        f"{gain_db:.2f} dB of gain margin and {phase_deg:.1f} degrees of phase margin may be lost or won. {advice}"
+def test_an_approximate_one_is_described_by_gain_and_phase_and_claims_no_margins(
+    gain_db: float, phase_deg: float, words: str
+) -> None:
+    found = sentence(certificate(path(0.1234, gain_db, phase_deg)))
+    assert found == f"Where the crossover of the loop usually lies, the controller's gain differs by up to {words}."
+
+
+def test_with_a_process_the_crossover_is_known() -> None:
+    assert sentence(certificate(path(0.1, 1.0, 5.0), loop=loop(True, True))).startswith("Where the crossover of the loop lies, ")
+
+
+def test_an_approximate_one_says_what_becomes_of_the_kick_where_it_changes() -> None:
+    assert sentence(certificate(path(0.1, 1.0, 5.0), kick=(2.0, 2.03))).endswith("5 degrees.")  # within 2 %
+    assert sentence(certificate(path(0.1, 1.0, 5.0), kick=(2.0, 2.8))).endswith(
+        "5 degrees. Setpoint changes: a step of 1 % moves the output at once by 2.8 %; with the old controller it moved it by 2 %."
     )
 
 
-@pytest.mark.parametrize(
-    ("deviation", "words"),
-    [
-        (0.00004567, "0.0046 %"),
-        (0.01, "1 %"),
-        (0.126, "13 %"),
-        (1.26, "130 %"),
-        (9.99, "1000 %"),
-        (10.1, "more than 1000 %"),
-        (math.inf, "more than 1000 %"),
-    ],
-)
-def test_deviations_have_two_digits(deviation: float, words: str) -> None:
-    assert f"comes within {words} of the old one" in sentence(certificate(path(deviation)))
-
-
-def test_equal_laws_that_run_differently_are_said_to() -> None:
-    same = (
-        "Against disturbances the two equations are the same, but run scan by scan, with the setpoint at rest, "
-        "they differ by up to "
+def test_controllers_of_which_one_does_not_respond_are_not_compared_in_decibels() -> None:
+    assert sentence(certificate(path(math.inf, math.inf, math.inf))) == (
+        "Where the crossover of the loop usually lies, the two cannot be compared, since one of them does not respond."
     )
-    found = sentence(certificate(scan_by_scan=run(0.5, 0.25)))
-    reason = "because of scan rule, arithmetic or a nonlinear option."
-    assert found == f"{same}0.25 % of span on test signals that move the output by 8 %, {reason}"
+
+
+def test_equal_laws_by_the_same_rules_whose_outputs_differ_are_said_to() -> None:
+    differ = "but emulated scan by scan, the outputs differ by up to 0.25 % of span."
+    assert sentence(certificate(scan_by_scan=run(0.5, 0.25))) == SAME + differ
     other = sentence(certificate(setpoint=path(0.3), kick=(2.0, 1.0), scan_by_scan=run(0.5, 0.25)))
-    assert other == f"{found} Setpoint changes will look different: a step moves the output at once by 1 % per %, before it was 2."
+    step = "a step of 1 % moves the output at once by 1 %; with the old controller it moved it by 2 %."
+    assert other == f"{SAME}{differ} Setpoint changes differ too: {step}"
 
 
-@pytest.mark.parametrize("aspect", ["error", "output"])
-def test_a_nonlinear_option_that_the_record_does_not_show_is_named_all_the_same(aspect: str) -> None:
+def test_outputs_that_differ_since_the_rules_do_change_no_verdict() -> None:
+    assert sentence(certificate(scan_by_scan=run(0.5, 0.25, same_rules=False))) == EXACT
+
+
+@pytest.mark.parametrize(
+    ("aspect", "words"),
+    [
+        ("error", "how small errors count"),
+        ("output", "what is done to the output"),
+        ("arithmetic", "the arithmetic they are computed with"),
+    ],
+)
+def test_what_is_nonlinear_inside_the_limits_is_named_though_the_record_does_not_show_it(aspect: Any, words: str) -> None:
     bent = (NonlinearDifference(aspect, "output deadband [%]: 0.5", {}),)
-    assert sentence(certificate(scan_by_scan=run(1e-9, 1e-9), nonlinear=bent)) == (
-        "Against disturbances the two equations are the same, but one has a nonlinear option that the other has not: see what to "
-        "watch for."
+    assert sentence(certificate(scan_by_scan=run(1e-9, 1e-9), nonlinear=bent)) == f"{SAME}what differs is {words}."
+
+
+@pytest.mark.parametrize("aspect", ["transfer", "limits", "bias"])
+def test_what_shows_at_transfers_alone_changes_no_verdict(aspect: Any) -> None:
+    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=(NonlinearDifference(aspect, "", {}),))) == EXACT
+
+
+def test_two_that_recover_differently_from_a_limit_are_alike_inside_their_limits() -> None:
+    recovery = (NonlinearDifference("windup", "", {}),)
+    assert sentence(certificate(nonlinear=recovery)) == EXACT.replace("changes.", "changes, inside its limits.")
+    assert sentence(certificate(nonlinear=recovery), ["P acts on the error"]) == EXACT.replace(
+        "changes.", "changes, inside its limits, if P acts on the error."
     )
 
 
-@pytest.mark.parametrize("aspect", ["windup", "transfer", "limits", "arithmetic"])
-def test_what_shows_at_limits_and_transfers_alone_changes_no_verdict(aspect: str) -> None:
-    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=(NonlinearDifference(aspect, "", {}),))) == EXACT
+def test_two_that_stay_apart_after_a_limit_are_not_called_alike() -> None:
+    assert sentence(certificate(shifts_for_good=True)) == f"{SAME}but after an output limit the two outputs stay apart for good."
 
 
 def test_a_setpoint_that_moves_otherwise_makes_setpoint_changes_different() -> None:
     limited = (NonlinearDifference("setpoint", "setpoint rate limit", {}),)
-    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=limited)) == FEEDBACK + "."
+    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=limited)) == FEEDBACK + FIRST
+
+
+@pytest.mark.parametrize(("cost", "coarse"), [(0.0009, False), (0.002, True)])
+def test_dials_that_round_coarsely_cost_the_verdict_from_a_thousandth_on(cost: float, coarse: bool) -> None:
+    found = sentence(
+        certificate(path(cost, 0.017, 0.1), feedback_before_rounding=path(), setpoint_before_rounding=path(), setpoint=path(cost))
+    )
+    gain = "but the dials round so coarsely that the controller's gain differs by up to 0.017 dB and its phase by up to 0.1 degrees."
+    assert found == (SAME + gain if coarse else EXACT)
+
+
+def test_what_the_verdict_rests_on_stands_in_the_sentence_two_facts_in_full() -> None:
+    assert sentence(certificate(), ["a"]) == EXACT.replace("changes.", "changes, if a.")
+    assert sentence(certificate(), ["a", "b"]) == EXACT.replace("changes.", "changes, if a and b.")
+    assert sentence(certificate(), ["a", "b", "c", "d"]) == EXACT.replace("changes.", "changes, if a and b (and 2 more, below).")
+
+
+def test_what_was_assumed_comes_first() -> None:
+    assert sentence(certificate(), assumed=["FORM = ideal"]) == f"Assuming FORM = ideal, which was not stated. {EXACT}"
+    assert sentence(certificate(), assumed=["A = 1", "B = 2"]) == f"Assuming A = 1 and B = 2, which were not stated. {EXACT}"
 
 
 class TestLoop:
     """What is said of the loop comes last, and louder where it is worse."""
 
-    def test_a_stable_loop_needs_no_words(self) -> None:
-        assert sentence(certificate(loop=loop(True, True))) == EXACT
+    def test_margins_are_stated_before_and_after(self) -> None:
+        assert sentence(certificate(loop=loop(True, True))) == (
+            f"{EXACT} With this process: gain margin from 3 to 3, phase margin from 50 to 50 degrees, Ms from 1.5 to 1.5."
+        )
+
+    def test_a_margin_that_is_infinite_is_left_out(self) -> None:
+        figures = LoopFigures(True, math.inf, 50.0, 2.0, 0.1, 1.5, 1.1, 10.0)
+        both = LoopComparison("1/(10 s + 1)", figures, replace(figures, phase_margin=45.678, Ms=1.6))
+        assert sentence(certificate(loop=both)) == (
+            f"{EXACT} With this process: phase margin from 50 to 45.7 degrees, Ms from 1.5 to 1.6."
+        )
 
     def test_a_loop_that_becomes_unstable_is_a_reason_not_to_use_the_settings(self) -> None:
-        found = sentence(certificate(path(0.9, 5.0, 40.0), loop=loop(True, False)))
-        assert found.endswith(f"{MUCH} {UNSTABLE}")
+        assert sentence(certificate(path(0.9, 5.0, 40.0), loop=loop(True, False))).endswith(f"40 degrees. {UNSTABLE}")
 
     def test_a_loop_that_was_unstable_raises_doubts_about_the_process(self) -> None:
         assert sentence(certificate(loop=loop(False, False))) == (
@@ -190,28 +231,49 @@ class TestLoop:
         assert UNSTABLE in sentence(certificate(path(0.01, 0.1, 0.5), loop=loop(True, False)))
 
 
-class TestScansTooLong:
-    """Half the scan rate within the loop band leaves figures of a part of it."""
+class TestScans:
+    """What the scans cost is said apart from the laws, with its sign."""
 
-    def test_the_sentence_then_says_so_and_gives_no_margins(self) -> None:
-        short = replace(path(0.2, 1.0, 5.0), loop_band=Band(0.001, 0.3, 0.2, 1.0, 5.0, 0.1))  # 5/Ti is 0.5 rad/s
-        found = sentence(
-            certificate(feedback_at_scan=short, setpoint_at_scan=path(0.1), scan_cost=ScanCost(0.3, 4.0, False, 0.2, cut=True))
+    LOSES = f"{SAME}what differs is how they are computed, scan by scan."
+
+    def test_phase_that_is_gained_leaves_it_exact_and_is_stated(self) -> None:
+        cost = ScanCost(0.0987654, -4.0514)
+        assert sentence(certificate(scan_cost=cost, scan_by_scan=run(9.0, 9.0, same_rules=False, scan=(2.0, 0.5)))) == (
+            f"{EXACT} The new controller scans faster: the loop gains 4.05 degrees of phase at 0.0988 rad/s."
         )
-        assert found.startswith("A scan interval is too long for this loop, whose integral time is 10 s: ")
-        assert "margin" not in found
 
-    def test_a_band_that_is_whole_is_judged_as_ever(self) -> None:
-        found = sentence(
-            certificate(feedback_at_scan=path(0.2, 1.0, 5.0), setpoint_at_scan=path(), scan_cost=ScanCost(0.5, 4.0, False, 0.2))
+    def test_a_degree_that_is_lost_leaves_it_exact_and_is_stated(self) -> None:
+        cost = ScanCost(0.1, 1.0)
+        assert sentence(certificate(scan_cost=cost, scan_by_scan=run(9.0, 9.0, same_rules=False, scan=(0.5, 1.0)))) == (
+            f"{EXACT} The new controller scans more slowly: the loop loses 1 degrees of phase at 0.1 rad/s."
         )
-        assert found.endswith(WATCH)
 
-    def test_with_a_process_the_band_ends_elsewhere(self) -> None:
-        short = replace(path(0.2, 1.0, 5.0), loop_band=Band(0.001, 0.3, 0.2, 1.0, 5.0, 0.1))
-        cost = ScanCost(0.3, 4.0, False, 0.2)
-        found = sentence(certificate(feedback_at_scan=short, setpoint_at_scan=path(0.1), scan_cost=cost, loop=loop(True, True)))
-        assert found.endswith(WATCH)
+    def test_more_than_a_degree_that_is_lost_does_not(self) -> None:
+        found = sentence(certificate(scan_cost=ScanCost(0.1, 1.01), scan_by_scan=run(9.0, 9.0, same_rules=False)))
+        assert found == (
+            f"{self.LOSES} As the two integrate or differentiate by different rules, the loop loses 1.01 degrees of phase at 0.1 rad/s."
+        )
+
+    def test_next_to_nothing_is_not_worth_a_word(self) -> None:
+        assert sentence(certificate(scan_cost=ScanCost(0.1, 0.049))) == EXACT
+
+    def test_settings_that_make_up_for_the_scans_are_exact_whatever_the_scans_cost(self) -> None:
+        cost = ScanCost(0.1, 5.0)
+        assert sentence(certificate(scan_cost=cost, compensated=True)).startswith(EXACT)
+
+    @pytest.mark.parametrize(
+        ("slow", "words"),
+        [
+            ("source", "The old scan was too slow for this loop: the crossover lies above half the scan rate. What the new scan changes "
+             "cannot be said: watch the loop after the cut-over."),
+            ("target", "The new scan is too slow for this loop: the crossover lies above half the scan rate. Scan faster, or tune the "
+             "loop slower."),
+            ("both", "Both scans are too slow for this loop: the crossover lies above half the scan rate. Scan faster, or tune the loop "
+             "slower."),
+        ],
+    )  # fmt: skip
+    def test_a_scan_that_is_too_slow_is_named_and_no_figure_stands_for_it(self, slow: Any, words: str) -> None:
+        assert sentence(certificate(scan_cost=ScanCost(0.3, math.inf, slow))) == f"{self.LOSES} {words}"
 
 
 CASES: dict[str, tuple[dict[str, object], str, dict[str, Any], str]] = {
@@ -220,19 +282,19 @@ CASES: dict[str, tuple[dict[str, object], str, dict[str, Any], str]] = {
         {"K": 2, "Ti": 30, "b": 0},
         "generic/series",
         {},
-        FEEDBACK + ": a step moves the output at once by 2 % per %, before it did not.",
+        FEEDBACK + "a step of 1 % moves the output at once by 2 %; with the old controller it did not.",
     ),
     "spike": (
         {"K": 2, "Ti": 30, "Td": 4, "c": 0},
         "generic/series",
         {},
-        FEEDBACK + ": a step spikes the output for one scan, before it was 2.",
+        FEEDBACK + "a step of 1 % spikes the output for one scan; with the old controller it moved it by 2 %.",
     ),
     "filter": (
         {"K": 2, "Ti": 30, "Td": 4, "Tf": 0.5},
         "generic/parallel",
         {"given": {"Tf": 4}},
-        "The new controller comes within ",
+        "Where the crossover of the loop usually lies, the controller's gain differs by up to ",
     ),
 }
 
@@ -248,7 +310,7 @@ def test_a_conversion_says_it(name: str) -> None:
 def test_a_conversion_that_makes_the_loop_unstable_says_so() -> None:
     source = pidemu.load_card("generic/standard").settings(K=8, Ti=30, Td=0.5, Tf=0.2)
     process = pidemu.Process.from_lags(1.0, lags=[10], delay=1.2)
-    found = pidemu.convert(source, "generic/parallel", process=process, scan=(0.1, 1.5), compensate=False)
+    found = pidemu.convert(source, "generic/parallel", process=process, scan=(0.1, 1.5))
     loop_ = found.certificate.loop
     assert loop_ is not None
     assert (loop_.source.stable, loop_.target.stable) == (True, False)

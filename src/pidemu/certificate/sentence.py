@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from pidemu.certificate.models import COARSE, Certificate, Kick, LoopComparison, ScanCost
 
@@ -25,7 +26,9 @@ def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[s
 
 
 def _assuming(assumed: Sequence[str]) -> str:
-    return f"Assuming {' and '.join(assumed)}, which was not stated." if assumed else ""
+    if not assumed:
+        return ""
+    return f"Assuming {' and '.join(assumed)}, which {'was' if len(assumed) == 1 else 'were'} not stated."
 
 
 def _if(conditions: Sequence[str]) -> str:
@@ -39,25 +42,40 @@ def _if(conditions: Sequence[str]) -> str:
 
 def _of_the_controllers(c: Certificate, conditions: Sequence[str]) -> str:
     limits = ", inside its limits" if any(d.aspect == "windup" for d in c.nonlinear) else ""
-    law = (c.feedback_before_rounding or c.headline).is_exact
     if c.verdict == "exact":
         return f"The new controller does what the old one did, for disturbances and for setpoint changes{limits}{_if(conditions)}."
     if c.verdict == "exact-feedback":
         return (
-            f"For disturbances, and in stability, the new controller does what the old one did{limits}{_if(conditions)}; "
+            f"For disturbances and in stability, the new controller does what the old one did{limits}{_if(conditions)}; "
             f"{_setpoint(c)}."
         )
-    if law and not c.is_bent and (c.rounding or 0) <= COARSE:
-        other = "" if c.setpoint_headline.is_exact else f" Setpoint changes differ too: {_setpoint(c)}."
-        return f"The two equations are the same{_if(conditions)}; what differs is when they are computed.{other}"
-    if law and c.is_bent:
-        return (
-            f"The two equations are the same{_if(conditions)}, but one controller does something to its signals that the other does"
-            " not: see what to watch for."
-        )
-    if law:
-        return f"The two equations are the same{_if(conditions)}, but the dials round so coarsely that {_differ(c)}."
+    if c.feedback_is_exact:
+        other = "" if c.setpoint_is_exact_in("auto") else f" Setpoint changes differ too: {_kick(c.setpoint_kick)}."
+        return f"The two equations are the same{_if(conditions)}; {_what_differs(c)}.{other}"
     return f"Where the crossover of the loop {_lies(c)}, {_differ(c)}{_if(conditions)}.{_also(c)}"
+
+
+def _what_differs(c: Certificate) -> str:
+    """Return why a verdict is approximate though the laws are the same."""
+    if c.is_bent:
+        parts = dict.fromkeys(_PARTS[d.aspect] for d in c.nonlinear if d.aspect in _PARTS)
+        return f"what differs is {' and '.join(parts)}"
+    if c.rounding is not None and c.rounding > COARSE:
+        return f"but the dials round so coarsely that {_differ(c)}"
+    if c.shifts_for_good:
+        return "but after an output limit the two outputs stay apart for good"
+    if c.scan_cost is not None and c.scan_cost.matters:
+        return "what differs is how they are computed, scan by scan"
+    assert c.scan_by_scan is not None
+    return f"but emulated scan by scan, the outputs differ by up to {_number(c.scan_by_scan.on_measurement)} % of span"
+
+
+_PARTS: Final = {
+    "error": "how small errors count",
+    "output": "what is done to the output",
+    "arithmetic": "the arithmetic they are computed with",
+}
+"""What is beyond the law and shows inside the limits, by aspect."""
 
 
 def _lies(c: Certificate) -> str:
@@ -66,6 +84,8 @@ def _lies(c: Certificate) -> str:
 
 def _differ(c: Certificate) -> str:
     band = c.headline.loop_band
+    if not (math.isfinite(band.gain_db) and math.isfinite(band.phase_deg)):
+        return "the two cannot be compared, since one of them does not respond"
     gain, phase = _number(band.gain_db), _number(band.phase_deg)
     return f"the controller's gain differs by up to {gain} dB and its phase by up to {phase} degrees"
 
@@ -78,33 +98,32 @@ def _also(c: Certificate) -> str:
 
 def _setpoint(c: Certificate) -> str:
     """Return how setpoint changes differ, by mode where that matters."""
-    cascade = c.setpoint_in_cascade
-    if cascade is None or c.kick_in_cascade is None:
+    cascade = c.kick_in_cascade
+    if c.setpoint_in_cascade is None or cascade is None:
         return f"setpoint changes differ: {_kick(c.setpoint_kick)}"
-    auto = (c.setpoint_before_rounding or c.setpoint_headline).is_exact
-    if auto:
-        return f"in automatic also for setpoint changes, in cascade these differ: {_kick(c.kick_in_cascade)}"
-    if cascade.is_exact:
-        return f"in cascade also for setpoint changes, in automatic these differ: {_kick(c.setpoint_kick)}"
-    return f"setpoint changes differ: in automatic {_kick(c.setpoint_kick)}, in cascade {_kick(c.kick_in_cascade)}"
+    if c.setpoint_is_exact_in("auto"):
+        return f"setpoint changes are the same in automatic and differ in cascade: {_kick(cascade)}"
+    if c.setpoint_is_exact_in("cascade"):
+        return f"setpoint changes are the same in cascade and differ in automatic: {_kick(c.setpoint_kick)}"
+    return f"setpoint changes differ: in automatic, {_kick(c.setpoint_kick)}; in cascade, {_kick(cascade)}"
 
 
 def _kick(kick: Kick) -> str:
     if kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=1e-6):
         return "the first move of the output is the same, what follows is not"
-    return f"a step {_moves(kick.target)}, with the old controller it {_moved(kick.source)}"
+    return f"a step of 1 % {_moves(kick.target)}; with the old controller it {_moved(kick.source)}"
 
 
 def _moves(kick: float) -> str:
     if math.isinf(kick):
         return "spikes the output for one scan"
-    return f"moves the output at once by {kick:.3g} % per %" if kick else "does not move the output at once"
+    return f"moves the output at once by {kick:.3g} %" if kick else "does not move the output at once"
 
 
 def _moved(kick: float) -> str:
     if math.isinf(kick):
         return "spiked it"
-    return f"moved by {kick:.3g} %" if kick else "did not"
+    return f"moved it by {kick:.3g} %" if kick else "did not"
 
 
 def _of_the_scans(c: Certificate) -> Iterator[str]:
@@ -112,14 +131,23 @@ def _of_the_scans(c: Certificate) -> Iterator[str]:
     if cost is None:
         return
     if cost.too_slow:
-        yield f"{_SLOW[cost.too_slow]} for this loop: half its rate lies below the crossover. Scan faster, or tune again, slower."
+        yield f"{_SLOW[cost.too_slow]}: the crossover lies above half the scan rate. {_REMEDY[cost.too_slow]}"
     elif abs(cost.phase_deg) >= _LEAST:
         yield _phase(c, cost)
 
 
 _LEAST = 0.05
 """Phase that is worth a word [deg]."""
-_SLOW = {"source": "The old scan was too slow", "target": "The new scan is too slow", "both": "Both scans are too slow"}
+_SLOW: Final = {
+    "source": "The old scan was too slow for this loop",
+    "target": "The new scan is too slow for this loop",
+    "both": "Both scans are too slow for this loop",
+}
+_REMEDY: Final = {
+    "source": "What the new scan changes cannot be said: watch the loop after the cut-over.",
+    "target": "Scan faster, or tune the loop slower.",
+    "both": "Scan faster, or tune the loop slower.",
+}
 
 
 def _phase(c: Certificate, cost: ScanCost) -> str:
@@ -128,7 +156,7 @@ def _phase(c: Certificate, cost: ScanCost) -> str:
     what = f"the loop {'gains' if gained else 'loses'} {_number(abs(cost.phase_deg))} degrees of phase at {cost.at:.3g} rad/s"
     if scans is not None and scans[0] != scans[1]:
         return f"The new controller scans {'faster' if scans[1] < scans[0] else 'more slowly'}: {what}."
-    return f"By the scan rules {what}."
+    return f"As the two integrate or differentiate by different rules, {what}."
 
 
 def _of_the_loop(loop: LoopComparison | None) -> Iterator[str]:
