@@ -14,7 +14,7 @@ from tests.cli.helpers import said, strict_json, told
 
 PROVOX = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav")
 PI = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "--to", "emerson/deltav")
-REFUSED = ("convert", "honeywell/tdc3000", "K=1", "T1=1", "T2=30", "--to", "emerson/deltav", "--set", "FORM=Standard")
+REFUSED = ("convert", "honeywell/tdc3000", "K=1", "T1=1", "T2=30", "FORM=interactive", "--to", "emerson/deltav", "--set", "FORM=Standard")
 HOPELESS = (*PI, "--set", "STRUCTURE=4")
 
 
@@ -48,11 +48,11 @@ def test_convert_prints_both_sides_the_verdict_and_the_figures() -> None:
         ["RESET", "4", "repeat/min", "=", "15", "s/repeat"],
         ["RATE", "0.1", "min", "=", "6", "s"],
     ]
-    assert parts["To"][2][:6] == ["GAIN", "2.7", "%/%", "2.8"]
-    assert parts["To"][3][:3] == ["RESET", "20.25", "s/repeat"]
-    assert parts["To"][0][-3:] == ["STRUCTURE=7;", "--set", "decides"]
+    assert parts["To"][0] == "chosen automatically: FORM=Series (--set to change, --explain for why)".split()
+    assert [row[:3] for row in parts["To"][2:5]] == [["GAIN", "2", "%/%"], ["RESET", "15", "s/repeat"], ["RATE", "5.25", "s"]]
+    assert parts["To"][5][:3] == ["ALPHA", "0.14286", "0.125"]  # 1/7, and what the textbook's rule leaves
     assert parts["Verdict"][0][0] == "exact:"
-    assert ["feedback", "(PV)", "loop", "band"] in [row[:4] for row in parts["Verdict"]]
+    assert ["feedback", "(PV)", "loop", "band"] in [row[:4] for row in parts["Figures"]]
 
 
 def test_convert_as_json_holds_what_programs_need() -> None:
@@ -68,21 +68,29 @@ def test_convert_as_json_holds_what_programs_need() -> None:
         "options": {},
     }
     assert {"card", "settings", "options"} == set(found["to"])
-    assert found["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "7", "FRSIPID_OPTS": "none"}
-    assert found["chosen"] == {"STRUCTURE": "7"}
-    assert found["to"]["settings"]["RESET"] == {"value": 20.25, "unit": "s/repeat"}
+    assert found["to"]["options"] == {"FORM": "Series", "STRUCTURE": "1", "FRSIPID_OPTS": "none"}
+    assert found["chosen"] == {"FORM": "Series"}
+    assert found["to"]["settings"]["ALPHA"] == {"value": 0.14286, "unit": "1", "unrounded": pytest.approx(1 / 7, rel=1e-12)}
     assert found["verdict"] == "exact"
     assert {"feedback", "setpoint"} <= set(found["certificate"])
 
 
 def test_convert_as_json_is_what_the_function_gives() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    assert pidemu.convert(source, "emerson/deltav").to_dict() == converted(*PROVOX)
+    assert pidemu.convert(source, "emerson/deltav", digits=5).to_dict() == converted(*PROVOX)
 
 
 def test_infinite_settings_are_words_in_json() -> None:
-    found = converted("convert", "generic/standard", "K=2", "Ti=off", "--to", "emerson/deltav")
-    assert found["to"]["settings"]["RESET"] == {"value": "inf", "unit": "s/repeat"}
+    found = converted("convert", "generic/standard", "K=2", "Ti=off", "--to", "emerson/deltav", "--set", "STRUCTURE=1")
+    assert found["to"]["settings"]["RESET"] == {"value": "inf", "unit": "s/repeat", "unrounded": "inf"}
+
+
+def test_infinite_settings_are_words_in_the_json_of_a_question() -> None:
+    """DeltaV's limits of the reset are infinite unless set."""
+    status, out, _ = said("convert", "emerson/deltav", "GAIN=2", "RESET=60", "RATE=6", "--to", "emerson/deltav", "--json")
+    [question] = strict_json(out)["questions"]
+    assert (status, question["kind"], question["about"]) == (1, "option", "FORM")
+    assert [r["settings"]["ARW_HI_LIM"]["value"] for r in question["readings"]] == ["inf", "inf"]
 
 
 def test_a_value_may_have_a_unit() -> None:
@@ -146,7 +154,7 @@ def test_a_refusal_says_why_and_what_would_be_nearest() -> None:
     )
     assert second == "nearest settings, which 'pidemu convert --allow-approximate' gives:"
     assert [line.split(" = ")[0].strip() for line in rest[:-1]][:4] == ["GAIN", "RESET", "RATE", "ALPHA"]
-    assert rest[-1].startswith("their cost: up to ")
+    assert rest[-1].startswith("their cost in the loop band: up to ")
 
 
 def test_a_refusal_without_any_useful_settings_offers_none() -> None:
@@ -155,7 +163,7 @@ def test_a_refusal_without_any_useful_settings_offers_none() -> None:
     assert err == (
         "error: refused: emerson/deltav cannot do what fisher/provox does: the source has integral action, "
         "emerson/deltav (FORM=Standard, STRUCTURE=4, FRSIPID_OPTS=none) has none; no settings of it come near; "
-        "other options would do: --set STRUCTURE=1: exact\n"
+        "other options would do: --set FORM=Series --set STRUCTURE=1: exact\n"
     )
     assert strict_json(said(*HOPELESS, "--json").out)["verdict"] == "refused"
 
@@ -170,20 +178,27 @@ def test_a_refusal_as_json_has_the_verdict_refused_and_the_nearest_settings() ->
     assert status == 1
     assert found["verdict"] == "refused"
     assert err == f"error: refused: {found['reason']}\n"
-    assert found["to"]["settings"]["RATE"] == {"value": 0.0, "unit": "s"}
+    assert found["nearest"]["to"]["settings"]["RATE"] == {"value": 0.0, "unit": "s", "unrounded": 0.0}
 
 
 def test_the_nearest_settings_are_given_where_approximation_is_allowed() -> None:
     found = converted(*REFUSED, "--allow-approximate")
     assert (found["match"], found["verdict"]) == ("constrained", "approximate")
-    assert found["warnings"][0].startswith("these are only the nearest settings: ")
+    assert found["warnings"][0].startswith("These are only the nearest settings: ")
 
 
 def test_dials_are_rounded_to_the_target_s_resolution_and_the_effect_is_stated() -> None:
     words = ("convert", "generic/standard", "K=2", "Ti=100", "Td=10", "--to", "honeywell/udc")
-    assert converted(*words)["certificate"]["dials"] == []
-    assert {d["name"]: d["rounded"] for d in converted(*words, "--round")["certificate"]["dials"]} == {"RSET": 1.67, "RATE": 0.17}
-    assert "Rounded to the dials' resolution" in told(*words, "--round")
+    dials = converted(*words)["certificate"]["dials"]
+    assert {d["name"]: (d["rounded"], d["to_resolution"]) for d in dials} == {"RSET": (1.67, True), "RATE": (0.17, True)}
+    assert "rounded to 5 digits, RSET, RATE to the dial's resolution: within 1 %" in " ".join(told(*words).split())
+
+
+@pytest.mark.parametrize(("digits", "gain"), [(3, 2.67), (5, 2.6667), (9, 2.66666667)])
+def test_dials_without_a_resolution_are_rounded_to_the_digits_asked_for(digits: int, gain: float) -> None:
+    words = ("convert", "generic/series", "K=2", "Ti=15", "Td=5", "--to", "generic/standard", "--digits", str(digits))
+    assert dials(*words)["K"] == gain  # 8/3
+    assert converted(*words)["to"]["settings"]["K"]["unrounded"] == pytest.approx(8 / 3, rel=1e-12)
 
 
 def test_other_ranges_on_the_target_rescale_the_gain() -> None:
@@ -240,10 +255,23 @@ def test_both_cards_may_be_files_or_come_from_a_folder(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("card_id", card_files())
-def test_every_example_of_every_card_converts_to_the_standard_form_or_is_refused(card_id: str) -> None:
+def test_every_example_of_every_card_converts_to_the_standard_form_or_is_refused_or_asked_about(card_id: str) -> None:
     card = pidemu.load_card(card_id)
     for example in card.data.examples:
         words = [f"{name}={value}" for name, value in example.given.items()]
         status, out, err = said("convert", card_id, *words, "--to", "generic/standard", "--json")
         found = strict_json(out)
-        assert (status == 1) == (found["verdict"] == "refused") == err.startswith("error: refused: ")
+        words_of = {"refused": "error: refused: ", "question": "question: "}
+        assert (status, err[: len(words_of.get(found["verdict"], ""))]) == (
+            int(found["verdict"] in words_of), words_of.get(found["verdict"], "")
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("card_id", card_files())
+def test_an_example_whose_options_are_all_stated_leaves_no_option_open(card_id: str) -> None:
+    card = pidemu.load_card(card_id)
+    for example in card.data.examples:
+        stated = {**card.settings(example.given).options, **example.given}
+        words = [f"{name}={value}" for name, value in stated.items()]
+        found = strict_json(said("convert", card_id, *words, "--to", "generic/standard", "--json").out)
+        assert [q for q in found.get("questions", ()) if q["kind"] == "option"] == []

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from pidemu.plain import json_safe
+
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
 
@@ -82,4 +84,7 @@ class Question:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain values for JSON."""
-        return {"kind": self.kind, "about": self.about, "text": self.text, "readings": [a.to_dict() for a in self.readings]}
+        plain: dict[str, Any] = json_safe(
+            {"kind": self.kind, "about": self.about, "text": self.text, "readings": [a.to_dict() for a in self.readings]}
+        )
+        return plain

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.certificate.models import EXACT
+from pidemu.certificate.models import EXACT, PathComparison
+from pidemu.conversion.command import words_for
 from pidemu.conversion.convert import convert
-from pidemu.conversion.request import Request
+from pidemu.conversion.modes import Modes, depends_on_mode
+from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.spans import ranges_needed
 from pidemu.conversion.target import is_computed
-from pidemu.errors import ConversionRefusedError
+from pidemu.errors import ConversionRefusedError, QuestionError
 from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.plain import json_safe
-from pidemu.ranges import RANGES, SignalRange, option_of
+from pidemu.ranges import RANGES, SignalRange
 from pidemu.settings import Settings
 
-Outcome = Literal["exact", "exact-feedback", "approximate", "refused", "failed"]
+Outcome = Literal["exact", "exact-feedback", "approximate", "question", "refused", "failed"]
 
-OUTCOMES: Final[tuple[Outcome, ...]] = ("exact", "exact-feedback", "approximate", "refused", "failed")
+OUTCOMES: Final[tuple[Outcome, ...]] = ("exact", "exact-feedback", "approximate", "question", "refused", "failed")
 """What a conversion can come to, the best first; ``failed`` is an error of this program, or of a card."""
+_MARKS: Final[dict[Outcome, str]] = {"exact": "=", "exact-feedback": "=", "question": "?", "refused": "x", "failed": "!"}
 _STATED: Final = SignalRange(0.0, 100.0)
 """The range that is stated where one is needed: typical gains are in percent per percent."""
 
@@ -38,15 +40,15 @@ class Cell:
     source, target : str
         Ids of the two cards.
     verdict : str
-        ``exact``, ``exact-feedback``, ``approximate``, ``refused`` or ``failed``.
+        ``exact``, ``exact-feedback``, ``approximate``, ``question``, ``refused`` or ``failed``.
     deviation : float or None
-        Largest deviation of the feedback path in the loop band [1]; 0 where it is only rounding. For a refusal it is that of the
-        nearest settings, ``None`` where there are none.
+        Largest deviation of the feedback path in the loop band [1]; 0 where the laws are the same before the dials are rounded.
+        For a refusal it is that of the nearest settings; ``None`` where there are none.
     setpoint_deviation : float or None
-        The same for the setpoint path [1].
+        The same for the setpoint path [1], in the mode in which it is larger.
     scan_by_scan_feedback : float or None
-        Largest difference of the two outputs, both emulated, while the setpoint rests [% of the output span]; 0 where it is only
-        rounding, ``None`` where they were not emulated.
+        Largest difference of the two outputs, both emulated with dials that are not rounded, while the setpoint rests [% of the
+        output span]; 0 where it is only arithmetic, ``None`` where they were not emulated.
     scan_by_scan : float or None
         The same with setpoint and measurement both moving.
     movement : float or None
@@ -60,7 +62,7 @@ class Cell:
     chosen : dict of str to str
         Options of the target that were chosen and are not as the card delivers them.
     sentence : str
-        The verdict in one sentence, or why there is none.
+        The verdict in one sentence, or the question, or why there is no verdict.
     command : str
         The command that shows this conversion with its whole certificate.
     """
@@ -87,12 +89,10 @@ class Cell:
 
     @property
     def mark(self) -> str:
-        """What a table shows of it: ``=`` the same law, ``~`` the same but for scan rule or arithmetic, else the deviation [%]."""
-        if self.verdict in ("refused", "failed"):
-            return "x" if self.verdict == "refused" else "!"
-        if self.deviation:
-            return percent(self.deviation)
-        return "~" if self.verdict == "approximate" else "="
+        """What a table shows of it: ``=`` the same law, ``~`` the same but for what is nonlinear, else the deviation [%]."""
+        if self.verdict != "approximate":
+            return _MARKS[self.verdict]
+        return percent(self.deviation) if self.deviation else "~"
 
     @property
     def setpoint_stands_out(self) -> bool:
@@ -157,12 +157,13 @@ def _converted(work: Work, source: str, target: str) -> Cell:
     card = load_card(work.names[target], work.vendors)
     settings = _ranged(typical_settings(load_card(work.names[source], work.vendors), derivative=work.derivative), card)
     held = {} if source == target else held_dials(card)
-    base = Cell(
-        source, target, "refused", given="; ".join((in_words(settings), *settings.notes)),
-        command=_command(work, settings, source, target, held),
-    )  # fmt: skip
+    mode: Modes = "auto" if depends_on_mode(settings) else "both"
+    command = words_for(settings, card, Request(given=held, mode=mode))
+    base = Cell(source, target, "refused", given="; ".join((in_words(settings), *settings.notes)), command=command)
     try:
-        found = convert(settings, card, given=held, emulate=work.emulate)
+        found = convert(settings, card, given=held, mode=mode, digits=DIGITS, emulate=work.emulate)
+    except QuestionError as asked:
+        return replace(base, verdict="question", sentence=str(asked))
     except ConversionRefusedError as refusal:
         figures = {} if refusal.nearest is None else _figures(refusal.nearest)
         return replace(base, **figures, sentence=str(refusal))
@@ -179,7 +180,9 @@ def _ranged(settings: Settings, target: Card) -> Settings:
 def _figures(c: Conversion) -> dict[str, Any]:
     """Return the figures of a conversion and what its settings are."""
     certificate, both = c.certificate, c.certificate.scan_by_scan
-    setpoint = certificate.setpoint_at_scan or certificate.setpoint
+    setpoint = [_off(certificate.setpoint_headline, certificate.setpoint_before_rounding)]
+    if certificate.setpoint_in_cascade is not None:
+        setpoint.append(_off(certificate.setpoint_in_cascade))
     emulated = {}
     if both is not None:
         emulated = {
@@ -188,8 +191,8 @@ def _figures(c: Conversion) -> dict[str, Any]:
             "movement": both.size,
         }
     return {
-        "deviation": _beyond_rounding(certificate.headline.loop_band.max_deviation),
-        "setpoint_deviation": _beyond_rounding(setpoint.loop_band.max_deviation),
+        "deviation": _off(certificate.headline, certificate.feedback_before_rounding),
+        "setpoint_deviation": max(setpoint),
         "match": c.match,
         "settings": in_words(c.settings),
         "chosen": dict(c.chosen),
@@ -197,8 +200,10 @@ def _figures(c: Conversion) -> dict[str, Any]:
     }
 
 
-def _beyond_rounding(deviation: float) -> float:
-    return 0.0 if deviation < EXACT else deviation
+def _off(path: PathComparison, before_rounding: PathComparison | None = None) -> float:
+    """Return the deviation in the loop band; 0 where there is none before the dials are rounded."""
+    exactly = (before_rounding or path).loop_band.max_deviation < EXACT
+    return 0.0 if exactly else path.loop_band.max_deviation
 
 
 def percent(deviation: float) -> str:
@@ -230,13 +235,3 @@ def in_words(settings: Settings) -> str:
 def _changed(settings: Settings) -> dict[str, str]:
     delivered = settings.card.variant().chosen
     return {n: c for n, c in settings.options.items() if c != delivered[n]}
-
-
-def _command(work: Work, settings: Settings, source: str, target: str, held: Mapping[str, float]) -> str:
-    """Return the command line of this conversion."""
-    values = [f"{n}={v.value:.15g}" for n, v in settings.items() if v.given and v.value != v.setting.default]
-    words = ["pidemu", "convert", work.names[source], *values, *(f"{n}={c}" for n, c in _changed(settings).items())]
-    ranges = zip(RANGES, (settings.pv_range, settings.op_range), strict=True)
-    words += [f"{option_of(name)}={given.argument}" for name, given in ranges if given is not None]
-    words += ["--to", work.names[target], *Request(given=held).words()]
-    return shlex.join([*words, *(w for folder in work.vendors for w in ("--vendors", folder))])

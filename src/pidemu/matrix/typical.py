@@ -44,6 +44,8 @@ _OTHERS: Final = {
 def typical_settings(card: Card, *, derivative: bool = True) -> Settings:
     """Return typical settings of a card, in the first choice of its options that makes a controller: mostly the card's defaults.
 
+    All options are stated, so that nothing about them is left to be asked.
+
     Gain 2, integral time 90 s and derivative time 10 s; where the form is parallel, integral gain 2/90 1/s and derivative gain
     20 s. Other dials are at the card's defaults, or at something sensible where it has none. Dials are rounded to four digits. A
     value outside a dial's range gives way to the nearest inside, which `Settings.notes` then says.
@@ -65,15 +67,15 @@ def typical_settings(card: Card, *, derivative: bool = True) -> Settings:
     >>> import pidemu
     >>> typical_settings(pidemu.load_card("fisher/provox"))
     <Settings fisher/provox: GAIN=2 %/%, RESET=0.6667 repeat/min, RATE=0.1667 min>
+    >>> typical_settings(pidemu.load_card("emerson/deltav")).defaulted
+    ()
     """
     if not has_terms(card):
         raise UndefinedError(f"{card.id} has no PID settings: it cancels the pole of a process model")
-    delivered = card.variant().chosen
     for variant in variants(card):
-        changed = {n: c for n, c in variant.chosen.items() if c != delivered[n]}
         dials, notes = _dials(variant, derivative)
         with suppress(UndefinedError):
-            settings = card.settings({**changed, **dials})
+            settings = card.settings({**variant.chosen, **dials})
             settings.algorithm()
             return replace(settings, notes=(*settings.notes, *notes))
     raise UndefinedError(f"{card.id}: no choice of its options makes a controller with typical settings; give settings of your own")
