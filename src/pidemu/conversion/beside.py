@@ -149,13 +149,10 @@ def _absorbed(c: Conversion) -> Iterator[Beside]:
     with suppress(PidemuError):
         request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
         found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
-        off = percent(found.certificate.feedback.loop_band.max_deviation)
-        yield Beside(
-            "absorbed",
-            f"without the lag, absorbed into the dials: {_dials(found.settings)}, {off}",
-            found.settings,
-            "--match low-frequency",
-        )
+        off = found.certificate.feedback.loop_band.max_deviation
+        if off < _FAR:
+            text = f"without the lag, absorbed into the dials: {_dials(found.settings)}, {percent(off)}"
+            yield Beside("absorbed", text, found.settings, "--match low-frequency")
 
 
 def _compensated(c: Conversion) -> Iterator[Beside]:

@@ -153,8 +153,8 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     opens = tuple(unstated(source))
+    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]
     ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
     work = _Work(source, card, request, aim)
