@@ -65,6 +65,8 @@ def runner_up(c: Conversion) -> Beside | None:
         if other.merit is None or other.settings is None or not _is_another(best.settings, other.settings):
             continue
         torn = best.merit.setpoint >= _TORN and other.merit.setpoint >= _TORN  # neither keeps the setpoint path
+        if other.merit.by_number and not best.merit.by_number:
+            continue
         same_class = RANK[other.verdict] <= RANK[best.verdict] and other.merit.setpoint == best.merit.setpoint
         if torn or (same_class and not other.merit.unused and other.merit.nonlinear == best.merit.nonlinear):
             return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(best, other))

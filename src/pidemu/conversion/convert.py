@@ -61,6 +61,7 @@ def convert(
     process: Process | None = None,
     compensate: bool = False,
     digits: int | None = None,
+    bias: float | None = None,
     allow_approximate: bool = False,
     assume: bool = False,
     emulate: bool = True,
@@ -106,6 +107,9 @@ def convert(
     digits : int, optional
         Round the dials to their resolution or, where the card states none, to so many significant digits: the certificate is about
         these numbers. By default they are not rounded.
+    bias : float, optional
+        Output of the old controller at SP = PV [% of the output span], for a loop without integral action; without it the answer
+        lists it as open.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     assume : bool
@@ -142,7 +146,7 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)

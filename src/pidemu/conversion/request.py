@@ -44,6 +44,8 @@ class Request:
         The process.
     digits : int or None
         Digits to round to.
+    bias : float or None
+        Output at SP = PV of a loop without integral action [% of the output span], where it was stated.
     compensate, allow_approximate, assume : bool
         As in `convert`.
     """
@@ -59,6 +61,7 @@ class Request:
     to_op_range: SignalRange | None = None
     process: Process | None = None
     digits: int | None = None
+    bias: float | None = None
     compensate: bool = False
     allow_approximate: bool = False
     assume: bool = False
@@ -90,6 +93,8 @@ class Request:
             yield from ("--process", written(self.process))
         if self.digits not in (None, DIGITS):
             yield from ("--digits", str(self.digits))
+        if self.bias is not None:
+            yield from ("--bias", exactly(self.bias))
         if self.tag:
             yield from ("--tag", self.tag)
         flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
@@ -118,6 +123,7 @@ def read_request(
     to_op_range: object,
     process: Process | None,
     digits: object,
+    bias: float | None,
     compensate: bool,
     allow_approximate: bool,
     assume: bool,
@@ -156,6 +162,7 @@ def read_request(
         to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
+        bias=bias,
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,

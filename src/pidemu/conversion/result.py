@@ -154,6 +154,10 @@ class Conversion:
         from pidemu.cutover.bench_check import bench_check
 
         lines = [f"Action: {self.action_text}." + self._old_action()]
+        if self.request.bias is not None and not self.settings.algorithm().ki:
+            lines.append(
+                f"Bias: set the output at SP = PV to {number(self.request.bias)} %, by the manual reset or bias of the new block."
+            )
         try:
             lines.append(f"Bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
         except ScanError as error:
