@@ -39,6 +39,8 @@ from pidemu.units import Role
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
+_PAIRED = (None, "exact", "same-numbers")
+"""Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
 _SMALLEST, _LARGEST = 1e-120, 1e120
 """Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
@@ -59,6 +61,7 @@ def convert(
     process: Process | None = None,
     compensate: bool = False,
     digits: int | None = None,
+    bias: float | None = None,
     allow_approximate: bool = False,
     assume: bool = False,
     emulate: bool = True,
@@ -104,6 +107,9 @@ def convert(
     digits : int, optional
         Round the dials to their resolution or, where the card states none, to so many significant digits: the certificate is about
         these numbers. By default they are not rounded.
+    bias : float, optional
+        Output of the old controller at SP = PV [% of the output span], for a loop without integral action; without it the answer
+        lists it as open.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     assume : bool
@@ -140,7 +146,7 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)
@@ -151,8 +157,8 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     opens = tuple(unstated(source))
+    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]
     ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
     work = _Work(source, card, request, aim)
@@ -251,6 +257,8 @@ class _Work:
         self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
         self.fixed = {**_shared(source, card), **request.given}
         self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
+        lag = source.algorithm(scan=request.scan[0] if request.scan else None).pv_filter
+        self.source_lag = lag.time if lag is not None and self.aim.match in _PAIRED else None
         if request.scan is not None:
             source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
@@ -262,7 +270,7 @@ class _Work:
             source = self.source
             ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
             scan = request.declared[1] if request.declared else None
-            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan)
+            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan, self.source_lag)
             goal.reject_missing()
             sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
             return Solver(
