@@ -201,11 +201,26 @@ def test_float32_shows_as_a_small_difference_that_is_not_exact(card: str) -> Non
     assert not found.is_exact
 
 
-def test_a_conversion_to_float32_is_approximate_though_the_laws_agree() -> None:
+def test_a_conversion_to_float32_is_exact_by_its_law_and_not_claimed_to_be_the_same_scan_by_scan() -> None:
+    found = pidemu.convert(PI, "iec/61131-3-pid", scan=1.0)
+    both = found.certificate.scan_by_scan
+    assert both is not None
+    assert found.verdict == "exact"
+    assert (both.is_exact, both.same_rules) == (False, False)
+    assert EXACT * 100 < both.largest < 450 * 50 * 2.0**-24  # as above
+
+
+def test_another_integral_rule_is_judged_by_the_phase_that_it_costs() -> None:
+    """By the trapezoidal rule the integral is ``ki (z + 1) h/2/(z - 1)``, by the backward rule ``ki z h/(z - 1)``: more by ki h/2."""
     found = pidemu.convert(PI, "oscat/ft-pid", scan=1.0)
-    assert found.certificate.headline.is_exact
-    assert found.verdict == "approximate"
-    assert "because of scan rule, arithmetic or a nonlinear option" in found.sentence
+    cost = found.certificate.scan_cost
+    assert cost is not None
+    w = 2 / 30
+    z = np.exp(1j * w)
+    backward, trapezoidal = (2 * (1 + rule / 30) for rule in (z / (z - 1), (z + 1) / (2 * (z - 1))))
+    assert cost.phase_deg == pytest.approx(np.degrees(np.angle(backward / trapezoidal)), rel=1e-6)
+    assert 0.3 < cost.phase_deg < 1  # less than a degree leaves it exact
+    assert found.verdict == "exact"
 
 
 @pytest.mark.parametrize(
@@ -228,6 +243,10 @@ def test_an_interval_that_nobody_gave_is_the_source_s_made_to_suit_its_settings(
     assert common_interval(source, source) == pytest.approx(h)
 
 
+def forward(Tf: float) -> Settings:
+    return settings("mathworks/pid2", Kp=2, Ki=0.002, Kd=1, Tf=Tf, b=1, c=1)
+
+
 def cpid(Tf: float) -> Settings:
     return settings("gnc-tools/cpid", Kp=2, Ki=0.002, Kd=1, Tf=Tf, b=1, c=1, rRampMax=1e9)
 
@@ -236,8 +255,14 @@ def cpid(Tf: float) -> Settings:
 def test_it_is_quartered_until_it_suits_the_filters_of_both(Tf: float, h: float) -> None:
     slow = settings("generic/standard", K=2, Ti=1000)  # a 200th is 5 s; the forward rule needs less than twice the filter time
     assert h < 2 * Tf <= (4 * h if h < 5 else 8 * h)
-    assert common_interval(slow, cpid(Tf)) == pytest.approx(h)
-    assert common_interval(cpid(Tf), slow) == pytest.approx(h)
+    assert common_interval(slow, forward(Tf)) == pytest.approx(h)
+    assert common_interval(forward(Tf), slow) == pytest.approx(h)
+
+
+def test_a_dial_that_counts_in_scans_has_its_interval() -> None:
+    """cpid's rRampMax is per scan."""
+    slow = settings("generic/standard", K=2, Ti=1000)
+    assert common_interval(slow, cpid(3.0)) == common_interval(cpid(3.0), slow) == 0.1
 
 
 def test_where_no_interval_suits_both_nothing_is_run_and_the_certificate_says_why() -> None:
@@ -247,7 +272,7 @@ def test_where_no_interval_suits_both_nothing_is_run_and_the_certificate_says_wh
     c = found.certificate
     assert (c.scan_by_scan, c.nonlinear) == (None, ())
     assert c.not_emulated.startswith("the filter time 1e-06 s is too short for the scan interval")
-    assert f"the two were not run against each other: {c.not_emulated}" in found.warnings
+    assert f"The two were not run against each other: {c.not_emulated}." in found.warnings
     assert c.feedback.is_exact
 
 

@@ -208,7 +208,7 @@ def test_the_conversion_of_the_documentation_names_its_filter_in_a_warning() -> 
     assert f is not None
     assert f.numerator == pytest.approx((1, 15))
     assert f.denominator == pytest.approx((1, 20.25))
-    assert any(f"a setpoint filter {f} before the target" in w for w in found.warnings)
+    assert any(f"A setpoint filter {f} before the new controller gives the old setpoint response" in w for w in found.warnings)
     assert found.to_dict()["setpoint_filter"] == f.to_dict()
 
 

@@ -67,7 +67,7 @@ def test_convert_as_json_holds_what_programs_need() -> None:
         },
         "options": {},
     }
-    assert {"card", "settings", "options"} == set(found["to"])
+    assert {"card", "settings", "options", "lag_on_pv"} == set(found["to"])
     assert found["to"]["options"] == {"FORM": "Series", "STRUCTURE": "1", "FRSIPID_OPTS": "none"}
     assert found["chosen"] == {"FORM": "Series"}
     assert found["to"]["settings"]["ALPHA"] == {"value": 0.14286, "unit": "1", "unrounded": pytest.approx(1 / 7, rel=1e-12)}
@@ -87,7 +87,7 @@ def test_infinite_settings_are_words_in_json() -> None:
 
 def test_infinite_settings_are_words_in_the_json_of_a_question() -> None:
     """DeltaV's limits of the reset are infinite unless set."""
-    status, out, _ = said("convert", "emerson/deltav", "GAIN=2", "RESET=60", "RATE=6", "--to", "emerson/deltav", "--json")
+    status, out, _ = said("convert", "emerson/deltav", "GAIN=2", "RESET=60", "RATE=15", "--to", "emerson/deltav", "--json")
     [question] = strict_json(out)["questions"]
     assert (status, question["kind"], question["about"]) == (1, "option", "FORM")
     assert [r["settings"]["ARW_HI_LIM"]["value"] for r in question["readings"]] == ["inf", "inf"]

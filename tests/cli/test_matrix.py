@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import shlex
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import pidemu
+from pidemu.conversion.questions import Question
 from pidemu.matrix import cell as cell_module
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, strict_json, told
@@ -23,7 +25,7 @@ def test_the_table_shows_marks_for_every_pair() -> None:
     rows = [line.split() for line in out.splitlines()[:3]]
     assert rows == [[*TWO], [TWO[0], "=", "="], [TWO[1], f"{100 * to_provox.max_deviation:.1f}*", "="]]
     assert out.splitlines()[4] == "4 conversions: 3 exact, 1 approximate"
-    assert "Verdicts rest on the linear laws alone." in out
+    assert "Verdicts rest on the continuous laws alone." in out
 
 
 def test_a_table_that_is_too_wide_comes_in_numbered_blocks() -> None:
@@ -79,11 +81,24 @@ def test_a_conversion_that_fails_is_reported_and_the_exit_status_is_one(monkeypa
     assert "1 conversion: 1 failed" in out
 
 
+def test_a_question_is_shown_as_one_and_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def asks(*words: Any, **rest: Any) -> pidemu.Conversion:
+        raise pidemu.QuestionError([Question("mode", "mode", "In which mode does the loop run?")])
+
+    monkeypatch.setattr(cell_module, "convert", asks)
+    status, out, err = said("matrix", "generic/standard", *QUICK)
+    assert (status, err) == (0, "")
+    assert out.splitlines()[1].split() == ["generic/standard", "?"]
+    assert "1 conversion: 1 question" in out
+
+
 def test_folders_of_one_s_own_cards_are_searched(tmp_path: Path) -> None:
     written(tmp_path, VALID)
     found = strict_json(told("matrix", "nobody/bench", *QUICK, "--vendors", str(tmp_path), "--json"))
     assert found["cells"][0]["verdict"] == "exact"
-    assert found["cells"][0]["command"].endswith(f"--vendors {tmp_path}")
+    [pidemu_, *words] = shlex.split(found["cells"][0]["command"])  # it names the card by its file, so that it runs anywhere
+    assert pidemu_ == "pidemu"
+    assert strict_json(told(*words, "--json"))["verdict"] == "exact"
 
 
 def test_an_unknown_card_is_wrong_usage() -> None:

@@ -32,53 +32,59 @@ def test_both_readings_are_printed_with_both_results_and_neither_is_chosen(capsy
     lines = err.splitlines()
     assert (status, out) == (1, "")
     assert lines[0] == (
-        "error: refused: these settings can be read in 2 ways, and nothing given says which is meant; "
-        "state it, as the command of each reading does"
+        "question: these settings can be read in 2 ways. Their integral gains are apart by a factor of up to 1.78. Which is meant?"
     )
     first, second = (lines.index(f"{k}. {r.text}") for k, r in enumerate(PROVOX, start=1))
     assert lines[first + 1].startswith("   -> emerson/deltav: GAIN = 2 %/%, RESET = 80 s/repeat, RATE = 0 s, ALPHA = ")
     assert lines[second + 1].startswith("   -> emerson/deltav: GAIN = 2 %/%, RESET = 45 s/repeat, RATE = 0 s, ALPHA = ")
     for reading, at in zip(PROVOX, (first, second), strict=True):
         assert lines[at + 2].strip() == pidemu.convert(reading.settings, "emerson/deltav").verdict
-    assert "Their integral gains are apart by a factor of up to 1.78." in lines
-    assert "pidemu does not choose between them. Whoever knows which is meant runs" in lines
-    assert lines[-2:] == [
-        '  1. pidemu convert fisher/provox GAIN=2 "RESET=0.75 repeat/min" --to emerson/deltav',
-        '  2. pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --to emerson/deltav',
+    assert [lines[at + 3].strip() for at in (first, second)] == [
+        'pidemu convert fisher/provox GAIN=2 "RESET=0.75 repeat/min" --to emerson/deltav',
+        'pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --to emerson/deltav',
     ]
+    assert "--assume" not in err  # it takes a card's default, and a card that is not known has none
 
 
 def test_each_command_gives_the_result_of_its_reading(capsys: pytest.CaptureFixture[str]) -> None:
-    asked: dict[str, Any] = {"options": {"FORM": "Series"}, "given": {"ALPHA": 0.1}, "scan": (1.0, 0.5), "round_dials": True}
+    asked: dict[str, Any] = {"options": {"FORM": "Series"}, "given": {"ALPHA": 0.1}, "scan": (1.0, 0.5), "digits": 4}
     status, out, err = refused(capsys, PROVOX, as_json=True, match="low-frequency", **asked)
     found = strict_json(out)
-    assert (status, found["verdict"], len(found["readings"])) == (1, "ambiguous", 2)
-    assert err == f"error: refused: {found['reason']}\n"
-    for reading in found["readings"]:
+    [question] = found["questions"]
+    assert (status, found["verdict"], question["kind"], len(question["readings"])) == (1, "question", "unit", 2)
+    assert err == f"question: {question['text']}\n"
+    for reading in question["readings"]:
         pidemu_, *words = shlex.split(reading["command"])
         assert pidemu_ == "pidemu"
         again = strict_json(told(*words, "--json"))
-        for part in ("from", "to", "match", "verdict", "scan"):
-            assert again[part] == reading["conversion"][part]
+        assert (again["match"], again["scan"]) == ("low-frequency", [1.0, 0.5])
+        assert (again["to"]["settings"], again["to"]["options"]) == (
+            {n: {**v, "unrounded": again["to"]["settings"][n]["unrounded"]} for n, v in reading["settings"].items()},
+            reading["options"],
+        )
 
 
 def test_the_results_as_json_are_those_of_the_function(capsys: pytest.CaptureFixture[str]) -> None:
-    found = strict_json(refused(capsys, PROVOX, as_json=True)[1])
-    assert found["apart"]["integral_gain_ratio"] == pytest.approx(80 / 45)
-    for reading, plain in zip(PROVOX, found["readings"], strict=True):
-        assert (plain["text"], plain["alike"], plain["refusal"]) == (reading.text, [], None)
-        assert plain["conversion"] == strict_json(told(*shlex.split(plain["command"])[1:], "--json"))
+    [question] = strict_json(refused(capsys, PROVOX, as_json=True, digits=5)[1])["questions"]
+    for reading, plain in zip(PROVOX, question["readings"], strict=True):
+        assert (plain["value"], plain["alike"], plain["outcome"]) == (reading.text, [], "")
+        wanted = pidemu.convert(reading.settings, "emerson/deltav", digits=5).settings
+        assert {n: v["value"] for n, v in plain["settings"].items() if n in ("GAIN", "RESET", "RATE")} == {
+            n: wanted[n].value for n in ("GAIN", "RESET", "RATE")
+        }
 
 
 def test_a_reading_that_the_target_refuses_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     found = pidemu.readings("emerson/deltav", GAIN=2, RESET=60)  # 60 repeats per second are beyond the range of the UDC's dial
     _, _, err = refused(capsys, found, "honeywell/udc")
     lines = err.splitlines()
-    assert lines[3].startswith("   -> honeywell/udc: GAIN = 2 %/%, RSET = ")
-    assert lines[7].startswith("   refused: honeywell/udc cannot do what emerson/deltav does")
-    plain = strict_json(refused(capsys, found, "honeywell/udc", as_json=True)[1])["readings"]
-    assert [p["conversion"] is None for p in plain] == [False, True]
-    assert plain[1]["refusal"] == lines[7].removeprefix("   refused: ")
+    first, second = (lines.index(f"{k}. {r.text}") for k, r in enumerate(found, start=1))
+    assert lines[first + 1].startswith("   -> honeywell/udc: GAIN = 2 %/%, RSET = ")
+    assert lines[second + 1].startswith("   refused: honeywell/udc cannot do what emerson/deltav does")
+    [question] = strict_json(refused(capsys, found, "honeywell/udc", as_json=True)[1])["questions"]
+    plain = question["readings"]
+    assert [p["settings"] is None for p in plain] == [False, True]
+    assert plain[1]["outcome"] == lines[second + 1].strip()
 
 
 def test_what_is_allowed_stays_allowed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,8 +108,8 @@ def test_descriptions_that_amount_to_the_same_stand_together(capsys: pytest.Capt
 
 def test_what_else_was_asked_for_is_passed_on(capsys: pytest.CaptureFixture[str]) -> None:
     found = pidemu.readings("fisher/provox", GAIN=2, RESET=0.75, pv_range=(0, 200), op_range=(0, 100))
-    err = refused(capsys, found, to_pv_range=(-50.0, 150.0), process=pidemu.Process.from_lags(2, [10]), compensate=False)[2]
+    err = refused(capsys, found, to_pv_range=(-50.0, 150.0), process=pidemu.Process.from_lags(2, [10]), compensate=True)[2]
     assert err.splitlines()[-1] == (
-        '  2. pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --pv-range=0,200 --op-range=0,100 '
-        "--to emerson/deltav --to-pv-range=-50,150 --process gain=2,lag=10 --no-compensation"
+        '   pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --pv-range=0,200 --op-range=0,100 '
+        "--to emerson/deltav --to-pv-range=-50,150 --process gain=2,lag=10 --compensate"
     )

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.conversion.unstated import unstated
 from pidemu.errors import CardNotFoundError, ConversionRefusedError, SettingError
 from pidemu.matrix import cell as cell_module
 from pidemu.matrix.cell import Cell, Work
@@ -52,6 +53,13 @@ def test_typical_settings_are_the_same_three_numbers_on_every_dial(name: str, de
     assert abs(integral) == pytest.approx(scale / 90, rel=5e-4)  # four digits
     assert abs(time) == pytest.approx(10 * scale if derivative else 0, rel=5e-4)
     assert settings.notes == ()
+
+
+@pytest.mark.parametrize("name", CARDS)
+def test_of_typical_settings_nothing_is_left_to_be_asked(name: str) -> None:
+    settings = typical_settings(pidemu.load_card(name))
+    assert settings.defaulted == ()
+    assert [o for o in unstated(settings) if o.asked] == []
 
 
 @pytest.mark.parametrize("name", CARDS)
@@ -105,8 +113,30 @@ def test_the_command_of_a_cell_shows_what_the_cell_says(four: Matrix) -> None:
         assert (said["verdict"], said["match"], said["sentence"]) == (cell.verdict, cell.match, cell.sentence)
         assert said["chosen"] == cell.chosen
         for path, stated in (("feedback", cell.deviation), ("setpoint", cell.setpoint_deviation)):
-            shown = said["certificate"][path]["loop_band"]["max_deviation"]
-            assert stated == (0 if shown < 1e-9 else shown)
+            shown, before = (said["certificate"][name] for name in (path, f"{path}_before_rounding"))
+            same = (before or shown)["loop_band"]["max_deviation"] < 1e-9
+            assert stated == (0 if same else shown["loop_band"]["max_deviation"])
+
+
+def test_an_equation_that_depends_on_the_mode_is_converted_as_in_automatic() -> None:
+    """No choice of DeltaV's STRUCTURE does in both modes what the block of Yokogawa does: as such it would be asked about."""
+    [cell] = [c for c in matrix(["yokogawa/fieldbus-pid", "emerson/deltav"], emulate=False).cells if c.source != c.target][:1]
+    assert (cell.source, cell.verdict, cell.setpoint_deviation) == ("yokogawa/fieldbus-pid", "approximate", 0)
+    assert cell.command.endswith("--mode auto")
+    assert cell.given.endswith("; in automatic")
+    assert cell.chosen == {"STRUCTURE": "2"}
+
+
+def test_ranges_are_stated_where_a_span_changes_a_dial() -> None:
+    cells = {c.target: c.command for c in matrix(["fisher/provox", "bailey/fc19", "emerson/deltav"], emulate=False).row("fisher/provox")}
+    assert "--pv-range=0,100" in cells["bailey/fc19"]
+    assert "-range" not in cells["emerson/deltav"]
+
+
+def test_all_options_of_the_source_are_stated_and_those_that_decide_it_are_told() -> None:
+    [cell] = matrix(["emerson/deltav"], emulate=False).cells
+    assert "FORM=Standard STRUCTURE=1 FRSIPID_OPTS=none --to" in cell.command
+    assert cell.given == "GAIN=2 %/%, RESET=90 s/repeat, RATE=10 s, ALPHA=0.125, FORM=Standard, STRUCTURE=1, FRSIPID_OPTS=none"
 
 
 def test_the_deviation_is_that_of_the_two_responses(four: Matrix) -> None:
@@ -129,6 +159,7 @@ def test_the_deviation_is_that_of_the_two_responses(four: Matrix) -> None:
         (Cell("a/a", "b/b", "approximate", 0.0, 0.0, 0.1, 0.1, 80.0), "~", False),
         (Cell("a/a", "b/b", "approximate", 0.0123, 0.0123), "1.2", False),
         (Cell("a/a", "b/b", "approximate", 0.00004, 0.9), "<.01", True),
+        (Cell("a/a", "b/b", "question"), "?", False),
         (Cell("a/a", "b/b", "refused", 0.2, 0.2), "x", False),
         (Cell("a/a", "b/b", "failed"), "!", False),
     ],

@@ -19,6 +19,7 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.engines import ENGINES, Engine
 from pidemu.errors import RecordError, SettingError
+from pidemu.plain import json_safe
 from pidemu.ranges import SignalRange, read_range
 from pidemu.words import assignments as assignments  # noqa: PLC0414
 from pidemu.words import pair, seconds, step
@@ -242,5 +243,5 @@ def _style(cell: str) -> str:
 
 
 def print_json(value: Any) -> None:
-    """Print plain values as JSON."""
-    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=str))
+    """Print plain values as JSON, with words for what is infinite."""
+    click.echo(json.dumps(json_safe(value), indent=2, ensure_ascii=False, allow_nan=False, default=str))

@@ -20,10 +20,10 @@ _PIPED: Final = 110
 """Columns of text that go into a pipe."""
 _LEGEND: Final = (
     "From the card of the row to the card of the column; a number is the largest deviation of the feedback path in the loop band, "
-    "in %. '=' the same law; '~' the same law, but outputs that differ scan by scan (rule, arithmetic, a nonlinear option); 'x' "
-    "refused; '!' failed; '*' the setpoint path deviates more than the feedback path."
+    "in %. '=' the same law; '~' the same law, but not all else (a deadband, a limit, arithmetic, coarse dials); '?' something has "
+    "to be answered first; 'x' refused; '!' failed; '*' the setpoint path deviates more than the feedback path."
 )
-_ALONE: Final = " Verdicts rest on the linear laws alone."
+_ALONE: Final = " Verdicts rest on the continuous laws alone."
 
 
 @click.command("matrix", short_help="Convert typical settings of every card to every card.")
@@ -31,7 +31,7 @@ _ALONE: Final = " Verdicts rest on the linear laws alone."
 @click.option("--csv", "text", metavar="FILE.csv", help="Write one line per conversion, with settings, figures and sentence.")
 @click.option("--html", "page", metavar="FILE.html", help="Write a heat map with all details; needs jinja2.")
 @click.option("--no-derivative", "plain", is_flag=True, help="Typical settings without derivative.")
-@click.option("--no-emulation", "laws", is_flag=True, help="Compare the linear laws alone, in a third of the time.")
+@click.option("--no-emulation", "laws", is_flag=True, help="Compare the continuous laws alone, in less time.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes that share the work; by default one per processor.")
 @vendors_option
 @json_option
@@ -47,8 +47,8 @@ def command(
 ) -> None:
     """Convert typical settings of every CARD to every CARD, by default of all cards, and print verdicts and deviations.
 
-    Typical settings are a gain of 2, 90 s of integral time and 10 s of derivative time; other dials are at the card's defaults. All
-    cards take about a minute. Exit status 1 if a conversion ends in an error that is no refusal.
+    Typical settings are a gain of 2, 90 s of integral time and 10 s of derivative time; other dials are at the card's defaults, and
+    all options are stated. All cards take some minutes. Exit status 1 if a conversion ends in an error that is no refusal.
     """
     if page is not None:
         from pidemu.report.matrix_page import check_page

@@ -8,20 +8,20 @@ from pidemu.cli.common import number, print_json
 from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
 from pidemu.errors import QuestionError
-from pidemu.plain import json_safe
 from pidemu.settings import Settings
 
 
 def print_questions(error: QuestionError, source: Settings | None, goal: str, as_json: bool) -> None:
     """Print what has to be answered first: on stderr, with ``--json`` on stdout."""
     if as_json:
-        known = {} if source is None else {"from": json_safe(source.to_dict()), "to": {"card": goal}}
+        known = {} if source is None else {"from": source.to_dict(), "to": {"card": goal}}
         print_json({**known, "verdict": "question", "questions": [q.to_dict() for q in error.questions]})
         click.echo(f"question: {error}", err=True)
         return
     for question in error.questions:
         _print(question)
-    click.echo("\n--assume takes the first reading of each question, and says so.", err=True)
+    if source is not None and all(q.readings for q in error.questions):
+        click.echo("\n--assume takes the first reading of each question, and says so.", err=True)
 
 
 def _print(question: Question) -> None:

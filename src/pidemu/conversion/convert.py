@@ -357,7 +357,7 @@ def _refuse_absurd_gains(source: Settings) -> None:
     a = source.algorithm()
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
+            raise SettingError(f"{source.card.id}: {gain:g} is not a {name} gain that a controller has; check the settings")
 
 
 def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:

@@ -159,7 +159,7 @@ def _converted(work: Work, source: str, target: str) -> Cell:
     held = {} if source == target else held_dials(card)
     mode: Modes = "auto" if depends_on_mode(settings) else "both"
     command = words_for(settings, card, Request(given=held, mode=mode))
-    base = Cell(source, target, "refused", given="; ".join((in_words(settings), *settings.notes)), command=command)
+    base = Cell(source, target, "refused", given=_given(settings, mode), command=command)
     try:
         found = convert(settings, card, given=held, mode=mode, digits=DIGITS, emulate=work.emulate)
     except QuestionError as asked:
@@ -222,14 +222,23 @@ def percent(deviation: float) -> str:
     return f"{x:.2f}".removeprefix("0") if x < 0.995 else f"{x:.1f}" if x < 9.95 else f"{x:.0f}"
 
 
+def _given(settings: Settings, mode: Modes) -> str:
+    """Return the source's settings in words, with all options and the mode where the equation depends on it."""
+    words = ", ".join([*_dials(settings), *(f"{n}={c}" for n, c in settings.options.items())])
+    return "; ".join((words, *settings.notes, *(["in automatic"] if mode == "auto" else [])))
+
+
 def in_words(settings: Settings) -> str:
     """Return the dials that were set, the derivative's filter and the setpoint weights, and options that are not as delivered."""
-    dials = [
+    return ", ".join([*_dials(settings), *(f"{n}={c}" for n, c in _changed(settings).items())])
+
+
+def _dials(settings: Settings) -> list[str]:
+    return [
         f"{n}={v.value:.6g} {v.unit}".removesuffix(" 1")
         for n, v in settings.items()
         if v.active and (v.given or is_computed(settings.equation, n, v.role))
     ]
-    return ", ".join([*dials, *(f"{n}={c}" for n, c in _changed(settings).items())])
 
 
 def _changed(settings: Settings) -> dict[str, str]:

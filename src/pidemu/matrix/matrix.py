@@ -44,7 +44,7 @@ class Matrix:
     derivative : bool
         Whether the derivative acts in the typical settings.
     emulated : bool
-        Whether both controllers were emulated, so that the verdict rests on that as well; otherwise on the linear laws alone.
+        Whether both controllers were emulated, so that the verdict rests on that as well; otherwise on the continuous laws alone.
     """
 
     cards: tuple[str, ...]
@@ -118,7 +118,7 @@ def matrix(
     derivative : bool
         Whether the derivative acts.
     emulate : bool
-        Whether every certificate emulates both controllers; without it the linear laws alone count, in a third of the time.
+        Whether every certificate emulates both controllers; without it the continuous laws alone count, in less time.
     jobs : int, optional
         Processes that share the work; by default as many as there are processors, and none where there is little to do. More
         than 1 needs, as always with processes, ``if __name__ == "__main__":`` in a script that calls this.
