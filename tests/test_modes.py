@@ -95,13 +95,20 @@ def test_a_remote_setpoint_is_a_setpoint_where_cascade_has_no_structure_of_its_o
 ) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
     a = chosen.algorithm()
-    if a.cascade_b is not None or a.sp_tracks:  # a setpoint that follows the measurement is the local one
+    if a.cascade_b is not None or a.sp_tracks or a.sp_rate_local:  # what tracks the measurement or has a rate is the local one
         return
     h, x = data.draw(scans_of(a)), history(seed).columns
     remote, local = (Controller(chosen, h, initial_output=30.0) for _ in range(2))
     sp = np.where(np.isnan(x["cascade"]) | (x["auto"] == 0), x["sp"], x["cascade"])
     one = remote.run(x["sp"], x["pv"], x["auto"], x["manual"], cascade=x["cascade"])
     assert one.tolist() == local.run(sp, x["pv"], x["auto"], x["manual"]).tolist()
+
+
+def test_a_rate_that_counts_for_the_local_setpoint_does_not_hold_back_the_remote_one() -> None:
+    ctl = bench(kp=1.0, ki=0.0, setpoint={"rate": 2.0, "rate-counts": "local"})
+    local, remote = float("nan"), [10.0, 30.0]
+    outputs = [ctl.scan(sp, 0.0, cascade=r) for sp, r in ((0.0, local), (5.0, local), *((5.0, r) for r in remote), (5.0, local))]
+    assert outputs == [0.0, 2.0, 10.0, 30.0, 28.0]  # back at the local setpoint, it goes there from where the remote one was
 
 
 def test_in_cascade_the_proportional_term_has_the_weight_of_cascade() -> None:

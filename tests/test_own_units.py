@@ -38,7 +38,8 @@ def step(settings: pidemu.Settings, limits: tuple[float, float] | None = None) -
 def test_one_degree_of_a_band_of_four_moves_a_heater_of_0_to_1_by_a_quarter(tmp_path: Path) -> None:
     s = card(tmp_path).settings(GAIN=4, RESET="off")
     assert step(s) == pytest.approx(0.25, rel=EXACT)
-    assert s.op_range is not None and s.op_range.ends == (0, 1)
+    assert s.op_range is not None
+    assert s.op_range.ends == (0, 1)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +121,7 @@ def test_a_conversion_reads_times_in_scans_at_the_scan_that_is_given(tmp_path: P
     s = bench.settings(GAIN=2, RESET=40)
     plain = pidemu.convert(s, "generic/standard", emulate=False)
     assert plain.settings["Ti"].value == pytest.approx(20, rel=EXACT)  # the card's 0.5 s
-    said = "nobody/bench: RESET in scans: taken at 0.5 s, the card's interval; give the real one, --scan"
+    said = "nobody/bench: RESET in scans: taken at 0.5 s, the card's interval; give the real one, --scan."
     assert said in plain.warnings
     at_two = pidemu.convert(s, "generic/standard", scan=2.0)
     assert at_two.settings["Ti"].value == pytest.approx(80, rel=EXACT)

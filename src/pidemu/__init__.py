@@ -102,6 +102,7 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "QuestionError",
     "Reading",
     "Record",
     "RecordError",

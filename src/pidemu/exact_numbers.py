@@ -236,7 +236,7 @@ def as_typed(x: float) -> Exact:
     typed = Fraction(repr(float(x)))
     if len(Decimal(repr(float(x))).as_tuple().digits) <= _DIGITS or not x:
         return Exact(typed)
-    most = max(1, math.isqrt(int(Fraction(_SIMPLE) / min(abs(typed), _SIMPLE))))
+    most = max(1, math.isqrt(int(_SIMPLE / min(abs(typed), Fraction(_SIMPLE)))))
     simple = typed.limit_denominator(most)
     small = abs(simple.numerator) * simple.denominator < _SIMPLE
     return Exact(simple if small and float(simple) == x else typed)

@@ -211,7 +211,7 @@ def test_a_conversion_to_float32_is_exact_by_its_law_and_not_claimed_to_be_the_s
 
 
 def test_another_integral_rule_is_judged_by_the_phase_that_it_costs() -> None:
-    """By the trapezoidal rule the integral is ``ki (z + 1) h/2/(z - 1)``, by the backward rule ``ki z h/(z - 1)``: more by ki h/2."""
+    """By the trapezoidal rule the integral is ``ki (z + 1) h/2/(z - 1)``, by the backward rule ``ki z h/(z - 1)``."""
     found = pidemu.convert(PI, "oscat/ft-pid", scan=1.0)
     cost = found.certificate.scan_cost
     assert cost is not None

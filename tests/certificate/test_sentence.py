@@ -26,6 +26,7 @@ EXACT = "The new controller does what the old one did, for disturbances and for 
 FEEDBACK = "For disturbances and in stability, the new controller does what the old one did; setpoint changes differ: "
 SAME = "The two equations are the same; "
 FIRST = "the first move of the output is the same, what follows is not."
+STEP = "a step of 1 % moves the output at once by"
 UNSTABLE = "WITH THIS PROCESS THE LOOP WOULD BE UNSTABLE: do not use these settings."
 
 
@@ -84,10 +85,9 @@ def test_where_only_the_setpoint_differs_both_kicks_are_named(kick: tuple[float,
 @pytest.mark.parametrize(
     ("auto", "cascade", "words"),
     [
-        (0.0, 0.3, "setpoint changes are the same in automatic and differ in cascade: a step of 1 % moves the output at once by 4 %"),
-        (0.3, 0.0, "setpoint changes are the same in cascade and differ in automatic: a step of 1 % moves the output at once by 2 %"),
-        (0.3, 0.3, "setpoint changes differ: in automatic, a step of 1 % moves the output at once by 2 %; with the old controller it "
-         "did not; in cascade, a step of 1 % moves the output at once by 4 %"),
+        (0.0, 0.3, f"setpoint changes are the same in automatic and differ in cascade: {STEP} 4 %"),
+        (0.3, 0.0, f"setpoint changes are the same in cascade and differ in automatic: {STEP} 2 %"),
+        (0.3, 0.3, f"setpoint changes differ: in automatic, {STEP} 2 %; with the old controller it did not; in cascade, {STEP} 4 %"),
     ],
 )  # fmt: skip
 def test_where_the_equation_depends_on_the_mode_each_mode_is_spoken_of(auto: float, cascade: float, words: str) -> None:
@@ -186,7 +186,9 @@ def test_dials_that_round_coarsely_cost_the_verdict_from_a_thousandth_on(cost: f
     found = sentence(
         certificate(path(cost, 0.017, 0.1), feedback_before_rounding=path(), setpoint_before_rounding=path(), setpoint=path(cost))
     )
-    gain = "but the dials round so coarsely that the controller's gain differs by up to 0.017 dB and its phase by up to 0.1 degrees."
+    gain = (
+        "but the dials round so coarsely that the controller's gain differs by up to 0.017 dB and its phase by up to 0.1 degrees."
+    )
     assert found == (SAME + gain if coarse else EXACT)
 
 
@@ -251,7 +253,8 @@ class TestScans:
     def test_more_than_a_degree_that_is_lost_does_not(self) -> None:
         found = sentence(certificate(scan_cost=ScanCost(0.1, 1.01), scan_by_scan=run(9.0, 9.0, same_rules=False)))
         assert found == (
-            f"{self.LOSES} As the two integrate or differentiate by different rules, the loop loses 1.01 degrees of phase at 0.1 rad/s."
+            f"{self.LOSES} As the two integrate or differentiate by different rules, the loop loses 1.01 degrees of phase at "
+            "0.1 rad/s."
         )
 
     def test_next_to_nothing_is_not_worth_a_word(self) -> None:
@@ -262,18 +265,17 @@ class TestScans:
         assert sentence(certificate(scan_cost=cost, compensated=True)).startswith(EXACT)
 
     @pytest.mark.parametrize(
-        ("slow", "words"),
+        ("slow", "words", "remedy"),
         [
-            ("source", "The old scan was too slow for this loop: the crossover lies above half the scan rate. What the new scan changes "
-             "cannot be said: watch the loop after the cut-over."),
-            ("target", "The new scan is too slow for this loop: the crossover lies above half the scan rate. Scan faster, or tune the "
-             "loop slower."),
-            ("both", "Both scans are too slow for this loop: the crossover lies above half the scan rate. Scan faster, or tune the loop "
-             "slower."),
+            ("source", "The old scan was too slow", "What the new scan changes cannot be said: watch the loop after the cut-over."),
+            ("target", "The new scan is too slow", "Scan faster, or tune the loop slower."),
+            ("both", "Both scans are too slow", "Scan faster, or tune the loop slower."),
         ],
     )  # fmt: skip
-    def test_a_scan_that_is_too_slow_is_named_and_no_figure_stands_for_it(self, slow: Any, words: str) -> None:
-        assert sentence(certificate(scan_cost=ScanCost(0.3, math.inf, slow))) == f"{self.LOSES} {words}"
+    def test_a_scan_that_is_too_slow_is_named_and_no_figure_stands_for_it(self, slow: Any, words: str, remedy: str) -> None:
+        assert sentence(certificate(scan_cost=ScanCost(0.3, math.inf, slow))) == (
+            f"{self.LOSES} {words} for this loop: the crossover lies above half the scan rate. {remedy}"
+        )
 
 
 CASES: dict[str, tuple[dict[str, object], str, dict[str, Any], str]] = {

@@ -116,8 +116,8 @@ SCHEMA = {
     "type": "object",
     "required": [
         "from", "to", "verdict", "certificate", "warnings",  # these names stay
-        "match", "verdicts", "sentence", "conditions", "chosen", "runner_up", "beside", "ranking", "textbook", "scan", "gain_factor",
-        "process", "setpoint_filter", "notes", "assumptions", "at_the_loop", "command",
+        "match", "verdicts", "sentence", "conditions", "chosen", "runner_up", "beside", "ranking", "textbook", "scan",
+        "gain_factor", "process", "setpoint_filter", "notes", "assumptions", "at_the_loop", "command",
     ],
     "properties": {
         "from": SIDE,
@@ -241,7 +241,7 @@ class TestExplain:
         assert ranking[0]["verdict"] == "exact"
         assert ranking[0]["changed"] == found["chosen"] == {"FORM": "Series"}
         text = told(*PROVOX, "--explain")
-        assert "FORM=Standard, STRUCTURE=7" in text[text.index("Options") :]
+        assert "FORM=Standard, STRUCTURE=7" in text[text.index("Why these options") :]
 
     def test_what_is_set_is_not_varied(self) -> None:
         ranking = converted(*PROVOX, "--set", "STRUCTURE=1")["ranking"]
@@ -280,8 +280,10 @@ class TestCutOver:
     """What to set, in which order."""
 
     def test_the_steps_are_numbered_and_the_bump_is_stated(self) -> None:
-        words = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "--to", "simple-pid/simple-pid", "--cut-over", "50,48,43", "--action", "reverse",
-                 "--pv-range", "0,100", "--op-range", "0,100")  # fmt: skip
+        words = (
+            "convert", "fisher/provox", "GAIN=2", "RESET=4", "--to", "simple-pid/simple-pid", "--cut-over", "50,48,43",
+            "--action", "reverse", "--pv-range", "0,100", "--op-range", "0,100",
+        )  # fmt: skip
         rows = section(told(*words), "Cut-over")
         numbered = [row[0] for row in rows if row[0].rstrip(".").isdigit()]
         assert numbered == [f"{k}." for k in range(1, len(numbered) + 1)]
@@ -498,7 +500,8 @@ def test_a_page_that_cannot_be_written_is_said_so() -> None:
 
 
 MATCHES = {
-    "best": "match is 'best'; it is one of exact, same-numbers, low-frequency, textbook, frequency, loop, constrained, or frequency:0.02rad/s",
+    "best": "match is 'best'; it is one of exact, same-numbers, low-frequency, textbook, frequency, loop, constrained, or "
+    "frequency:0.02rad/s",
     "loop:1rad/s": "match is 'loop:1rad/s'; only 'frequency' takes a number, such as frequency:0.02rad/s",
     "frequency:1": "match is 'frequency:1'; write the frequency as a number with one of the units rad/s, rad/min, rad/h, Hz, mHz",
     "frequency:0Hz": "match is 'frequency:0Hz'; the frequency must be ",

@@ -128,7 +128,9 @@ def test_an_equation_that_depends_on_the_mode_is_converted_as_in_automatic() -> 
 
 
 def test_ranges_are_stated_where_a_span_changes_a_dial() -> None:
-    cells = {c.target: c.command for c in matrix(["fisher/provox", "bailey/fc19", "emerson/deltav"], emulate=False).row("fisher/provox")}
+    cells = {
+        c.target: c.command for c in matrix(["fisher/provox", "bailey/fc19", "emerson/deltav"], emulate=False).row("fisher/provox")
+    }
     assert "--pv-range=0,100" in cells["bailey/fc19"]
     assert "-range" not in cells["emerson/deltav"]
 
