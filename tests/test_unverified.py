@@ -29,8 +29,10 @@ def test_an_option_that_makes_the_same_law_does_not_count() -> None:
 
 
 def test_a_choice_that_was_made_does_not_count_and_one_that_was_not_does() -> None:
-    assert law_paths("emerson/deltav", GAIN=2, RESET=20) == ["STRUCTURE"]
-    assert law_paths("emerson/deltav", GAIN=2, RESET=20, STRUCTURE=1) == []
+    left_open = law_paths("emerson/deltav", GAIN=2, RESET=20)
+    stated = law_paths("emerson/deltav", GAIN=2, RESET=20, STRUCTURE=1, FRSIPID_OPTS="none")
+    assert left_open == ["STRUCTURE", "FRSIPID_OPTS", "proportional.on", "integral.on"]
+    assert stated == ["proportional.on", "integral.on"]  # inferred from the fieldbus block, whatever was chosen
 
 
 def test_limits_that_are_given_and_a_scan_interval_that_is_given_are_not_the_cards() -> None:

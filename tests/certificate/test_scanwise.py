@@ -276,6 +276,19 @@ def test_where_no_interval_suits_both_nothing_is_run_and_the_certificate_says_wh
     assert c.feedback.is_exact
 
 
+def test_a_series_product_of_mixed_rules_has_not_the_rules_of_a_sum() -> None:
+    """Trapezoidal times backward is ``Td/Ti (z + 1)/(2 z)``, which a sum has as ``Td/Ti``; backward times backward is that too."""
+    series = settings("honeywell/tdc3000", K=2, T1=1.5, T2=0.2, FORM="interactive", CTEQN="A")
+    found = pidemu.convert(series, "generic/parallel", options={"INTEGRAL_RULE": "trapezoidal"})
+    both = found.certificate.scan_by_scan
+    assert both is not None
+    assert (both.same_rules, both.is_exact_on_measurement) == (False, False)
+    assert found.verdict == "exact"
+    backward = pidemu.convert(settings("fisher/provox", GAIN=2, RESET=4, RATE=0.1), "generic/parallel").certificate.scan_by_scan
+    assert backward is not None
+    assert (backward.same_rules, backward.is_exact) == (True, True)
+
+
 def test_given_intervals_are_used_and_one_that_is_taken_is_said_to_be() -> None:
     given, taken = (pidemu.convert(PI, "generic/parallel", scan=h).certificate.scan_by_scan for h in ((0.5, 0.5), None))
     assert given is not None

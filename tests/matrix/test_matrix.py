@@ -141,6 +141,13 @@ def test_all_options_of_the_source_are_stated_and_those_that_decide_it_are_told(
     assert cell.given == "GAIN=2 %/%, RESET=90 s/repeat, RATE=10 s, ALPHA=0.125, FORM=Standard, STRUCTURE=1, FRSIPID_OPTS=none"
 
 
+def test_a_derivative_without_filter_gets_a_usual_filter_where_the_target_delivers_none() -> None:
+    """Not the lowest that the dial takes: N = 1 would leave hardly a derivative."""
+    [cell] = [c for c in matrix(["generic/standard", "astrom-hagglund/listing"], emulate=False).row("generic/standard")][1:]
+    assert cell.settings == "K=2 eu/eu, Ti=90 s, Td=10 s, Tt=30 s, N=10, b=1"
+    assert cell.deviation == pytest.approx(0.029, abs=5e-4)
+
+
 def test_the_deviation_is_that_of_the_two_responses(four: Matrix) -> None:
     """A law by hand: PROVOX is series with a lead-lag of ratio 1/8, DeltaV's standard form has the filter on its derivative."""
     cell = four.row("emerson/deltav")[0]

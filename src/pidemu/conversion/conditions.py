@@ -108,9 +108,9 @@ _MINOR: Final = (".on", ".applies-to")
 
 
 def _name(s: Settings) -> str:
-    """Return what to call a controller in a sentence: its product where that is short, else the card."""
+    """Return what to call a controller in a sentence: its product where that is one and short, else the card."""
     product = s.card.data.product.split(" (")[0]
-    return product if len(product) < _LONG else s.card.id
+    return product if len(product) < _LONG and "," not in product else s.card.id
 
 
 def _in_words(statement: Statement, s: Settings, name: str) -> str | None:

@@ -24,6 +24,8 @@ FilterKind = Literal["none", "time", "ratio", "gain"]
 _CORE: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 _HARDLY: Final = 100.0
 """Derivative gain of a filter that is hardly one."""
+_USUAL: Final = {"gain": 10.0, "ratio": 0.1}
+"""Filter of a derivative where the card delivers none: a tenth of the derivative time."""
 _WEIGHTS: Final = (Role.PROPORTIONAL_WEIGHT, Role.DERIVATIVE_WEIGHT)
 
 
@@ -255,8 +257,10 @@ class Target:
         role, unit = Role(setting.sets), parse_unit(setting.unit)
         pace = self.pace if kind == "time" else 1.0
         low, high = (to_canonical(role, x, unit, self.spans) * pace for x in limits(setting))
-        present = self.template()[given].canonical * pace
-        return TargetFilter(kind, given, self.is_free(given, setting), present, low=low, high=high, **shape)
+        present, free = self.template()[given].canonical * pace, self.is_free(given, setting)
+        if free and setting.default is None and kind != "time":
+            present = min(max(_USUAL[kind], low), high)
+        return TargetFilter(kind, given, free, present, low=low, high=high, **shape)
 
     @cached_property
     def shape(self) -> Algorithm:
