@@ -80,8 +80,13 @@ def test_an_action_against_the_sign_of_the_gain_is_a_contradiction_and_named() -
     assert "these settings are direct acting, PV - SP: negative gains" in text
     assert check_action(s, "direct") == check_action(s, None) == ""
     assert check_action(settings("emerson/deltav", GAIN=2, RESET=10), "direct") == ""  # it has a switch
-    with pytest.raises(SettingError, match="stated as reverse acting"):
-        pidemu.convert(s, "emerson/deltav", action="reverse")
+    ranged = settings("simple-pid/simple-pid", Kp=-2, pv_range=(0, 100), op_range=(0, 100))
+    with pytest.raises(pidemu.QuestionError, match="stated as reverse acting") as asked:
+        pidemu.convert(ranged, "emerson/deltav", action="reverse")
+    [question] = asked.value.questions
+    assert (question.kind, [answer.value for answer in question.readings]) == ("action", ["direct", "reverse"])
+    gains = [answer.conversion.settings["GAIN"].value for answer in question.readings if answer.conversion is not None]
+    assert gains == [2, 2]  # the size of a dial does not depend on it
 
 
 def test_negative_gains_on_a_card_with_a_switch_turn_what_the_switch_stands_at() -> None:
@@ -101,7 +106,7 @@ def test_both_actions_are_named_where_it_is_not_known() -> None:
 @pytest.mark.parametrize("target", ["simple-pid/simple-pid", "epics/epid", "iec/61131-3-pid", "oscat/ft-pid"])
 @pytest.mark.parametrize("action", ACTIONS)
 def test_a_target_whose_gain_carries_the_sign_gets_the_sign_of_the_stated_action(target: str, action: str) -> None:
-    source = settings("fisher/provox", GAIN=2, RESET=4)
+    source = settings("fisher/provox", GAIN=2, RESET=4, pv_range=(0, 100), op_range=(0, 100))
     wanted = pidemu.convert(source, target)
     found = pidemu.convert(source, target, action=action)
     assert carried_action(found.settings) == found.action == action

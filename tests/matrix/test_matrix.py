@@ -143,7 +143,7 @@ def test_all_options_of_the_source_are_stated_and_those_that_decide_it_are_told(
 
 def test_a_derivative_without_filter_gets_a_usual_filter_where_the_target_delivers_none() -> None:
     """Not the lowest that the dial takes: N = 1 would leave hardly a derivative."""
-    [cell] = [c for c in matrix(["generic/standard", "astrom-hagglund/listing"], emulate=False).row("generic/standard")][1:]
+    cell = matrix(["generic/standard", "astrom-hagglund/listing"], emulate=False).row("generic/standard")[1]
     assert cell.settings == "K=2 eu/eu, Ti=90 s, Td=10 s, Tt=30 s, N=10, b=1"
     assert cell.deviation == pytest.approx(0.029, abs=5e-4)
 
