@@ -206,6 +206,6 @@ def _check(value: Value, written: object) -> None:
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
-        raise SettingError(f"{shown} is infinite, and infinity is no off value here")
+        raise SettingError(f"{shown} is infinite, and infinity does not switch it off")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
-        raise SettingError(f"{shown} would be infinite action; the smallest value above zero is meant, or another unit")
+        raise SettingError(f"{shown} would be infinite action; give a value above zero, or another unit")
