@@ -167,7 +167,7 @@ def _cell(where: str, text: str, name: str) -> float:
             raise RecordError(f"{where}: '{text}' has a comma; write a decimal point") from None
         raise RecordError(f"{where}: '{text}' is not a number") from None
     if name == "interval" and math.isnan(value):
-        raise RecordError(f"{where}: '{text}' is no interval; leave the cell empty for the nominal one")
+        raise RecordError(f"{where}: '{text}' is not an interval; leave the cell empty for the nominal one")
     if name in SIGNALS and math.isinf(value):
         raise RecordError(f"{where}: '{text}' is not a finite number; leave the cell empty where there is no signal")
     return value
