@@ -329,5 +329,5 @@ def test_what_cannot_be_compared_is_refused(settings: list[Settings], scan: floa
 
 
 def test_limits_that_are_no_range_are_refused() -> None:
-    with pytest.raises(ScanError, match=r"^output limits 100 to 0 are no range; give low, then high$"):
+    with pytest.raises(ScanError, match=r"^output limits 100 to 0 are not a range; give low, then high$"):
         pidemu.compare([pi(), pi()], output_limits=(100, 0))

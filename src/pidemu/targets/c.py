@@ -133,7 +133,7 @@ def check_name(name: str) -> None:
         It is no C identifier, or one that C or C++ keeps for itself.
     """
     if not re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name):
-        raise EngineError(f"'{name}' is no name in C; give letters, digits and single underscores, a letter first")
+        raise EngineError(f"'{name}' is not a name in C; give letters, digits and single underscores, a letter first")
     if name in RESERVED:
         raise EngineError(f"'{name}' is a word of C or C++; give another name, such as {name}_control")
 
