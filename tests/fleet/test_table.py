@@ -124,7 +124,7 @@ WRONG = {
     'A,generic/standard,"K=2': ("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
 }
 
-WRONG["A" * 200_000] = "no row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
+WRONG["A" * 200_000] = "not a row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))
