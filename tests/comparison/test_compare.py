@@ -268,7 +268,7 @@ def test_a_controller_without_integral_has_the_initial_output_for_its_bias() -> 
     found = pidemu.compare([pi(Ti="off"), pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=0)], scan=1.0)
     assert found.outputs["generic/standard"][0] == 50
     assert found.differences[0].largest == 0
-    assert "generic/standard: there is no integral: the bias, its output at zero error, is 50 %" in found.notes
+    assert "generic/standard: without integral action its output at zero error is a bias, 50 %" in found.notes
 
 
 def test_direct_action_mirrors_the_outputs() -> None:
