@@ -172,11 +172,11 @@ def test_a_long_table_ends_with_how_many_more_there_are(folder: Path) -> None:
         ),
         (
             "generic/standard K=2 Ti=40 generic/standard K=2 Ti=40 --scan 1,fast",
-            "Invalid value for '--scan': '1,fast' is no scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
+            "Invalid value for '--scan': '1,fast' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
         ),
         (
             "generic/standard K=2 Ti=40 generic/standard K=2 Ti=40 --scan 0",
-            "Invalid value for '--scan': '0' is no scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
+            "Invalid value for '--scan': '0' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
         ),
     ],
 )

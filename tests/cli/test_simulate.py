@@ -28,7 +28,7 @@ The loop
   setpoint step  10 % at 18 s
   load step      10 % at 180 s
 
-What it did, errors from the load step on
+Result, errors from the load step on
 """
 
 
@@ -95,7 +95,7 @@ def test_steps_time_scan_and_limits_are_those_given() -> None:
 
 def test_without_a_load_step_errors_count_from_the_start() -> None:
     out = told(*WORDS, "--load", "0", "--setpoint", "0,5")
-    assert "What it did, errors from the start on" in out
+    assert "Result, errors from the start on" in out
     assert figure(out, "largest error") == 5
 
 
