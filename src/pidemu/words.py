@@ -54,7 +54,7 @@ def seconds(text: str) -> float:
     Raises
     ------
     SettingError
-        It is no time.
+        It is not a time.
     """
     try:
         number, unit = parse_quantity(text.strip())

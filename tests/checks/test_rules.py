@@ -32,7 +32,7 @@ _UNITS = "1, %/%, %, eu, eu/eu, %/eu, Hz, " + ", ".join(
     f"{time}, {time}/repeat, repeat/{time}, 1/{time}, %/{time}, eu/{time}" for time in ("ms", "s", "min", "h")
 )
 _UNITS += "; also scan in place of a time, and degC, K, degF in place of eu"
-_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero leaves no derivative; set the derivative itself to zero"
+_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero means no derivative; set the derivative to zero"
 _FILTER_GAIN: tuple[Edit, ...] = (
     ("ratio: ALPHA", "gain: ALPHA"),
     (ALPHA, '  ALPHA: {sets: filter-gain, unit: "1", default: 0}\n'),

@@ -90,7 +90,8 @@ SETTINGS = {
         "in 1/s; write 3 1/min if the gain is meant"
     ),
     f"convert fisher/provox GAIN=nan RESET=4 {_TO}": "fisher/provox: GAIN: is not a number (NaN)",
-    f"convert fisher/provox GAIN=inf RESET=4 {_TO}": "fisher/provox: GAIN: inf %/% is infinite, and infinity does not switch it off",
+    f"convert fisher/provox GAIN=inf RESET=4 {_TO}": "fisher/provox: GAIN: "
+    "inf %/% is infinite, and infinity does not switch it off",
     f"convert fisher/provox GAIN=2,5 RESET=4 {_TO}": "fisher/provox: GAIN: '2,5' has a comma; write a decimal point",
     f"convert fisher/provox GAIN=two RESET=4 {_TO}": f"fisher/provox: GAIN: 'two' {_NUMBER}",
     f"convert fisher/provox GAIN=-2 RESET=4 {_TO}": "fisher/provox: GAIN: -2 %/% is outside 0 to inf %/%",

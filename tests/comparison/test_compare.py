@@ -192,7 +192,7 @@ def test_cards_that_measure_the_interval_follow_an_uneven_record() -> None:
 
 def test_a_record_whose_time_stands_still_cannot_be_read_at_another_interval() -> None:
     record = Record(of(50, 51, 52), of(50, 50, 50), time=of(0, 1, 1))
-    with pytest.raises(RecordError, match=r"^record: its time does not increase from line to line; to be read every 0\.5 s it must go on"):
+    with pytest.raises(RecordError, match=r"^record: its time does not increase from line to line"):
         pidemu.compare([pi(), pi()], record, 0.5)
 
 
