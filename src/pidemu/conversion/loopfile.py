@@ -14,7 +14,6 @@ from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
 
-
 Interval = Number | Annotated[list[Number], Field(min_length=1, max_length=2)]
 
 
