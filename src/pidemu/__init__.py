@@ -14,15 +14,18 @@ if TYPE_CHECKING:
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import convert
+    from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
     from pidemu.emulator import Controller
     from pidemu.errors import (
+        ActionError,
         CardError,
         ConversionRefusedError,
         EngineError,
         FleetError,
         PidemuError,
         ProcessError,
+        QuestionError,
         RecordError,
         ScanError,
         SettingError,
@@ -51,15 +54,19 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "Answer": "conversion.questions",
+    "Question": "conversion.questions",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",
     "Controller": "emulator",
+    "ActionError": "errors",
     "CardError": "errors",
     "ConversionRefusedError": "errors",
     "EngineError": "errors",
     "FleetError": "errors",
     "PidemuError": "errors",
     "ProcessError": "errors",
+    "QuestionError": "errors",
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",
@@ -82,6 +89,8 @@ _HOMES = {
 }
 
 __all__ = [
+    "ActionError",
+    "Answer",
     "Card",
     "CardError",
     "Comparison",
@@ -100,6 +109,8 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "Question",
+    "QuestionError",
     "Reading",
     "Record",
     "RecordError",

@@ -24,6 +24,7 @@ from pidemu.errors import ScanError
 from pidemu.plain import json_safe
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
+from pidemu.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof
@@ -224,10 +225,11 @@ class Conversion:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What the result rests on without anybody having said so; what makes the law first."""
-        found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
-        law = [text for a, text in found if a.makes_the_law]
-        return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
+        """Every fact of the two cards that is assumed or inferred and at work at these settings; what makes the law first."""
+        both = (self.source, self.settings)
+        law = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_law(s))]
+        program = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_program(s, scan=self.scan is not None))]
+        return tuple(dict.fromkeys(law + program))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json``."""
