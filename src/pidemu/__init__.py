@@ -14,9 +14,11 @@ if TYPE_CHECKING:
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import convert
+    from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
     from pidemu.emulator import Controller
     from pidemu.errors import (
+        ActionError,
         CardError,
         ConversionRefusedError,
         EngineError,
@@ -52,9 +54,12 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "Answer": "conversion.questions",
+    "Question": "conversion.questions",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",
     "Controller": "emulator",
+    "ActionError": "errors",
     "CardError": "errors",
     "ConversionRefusedError": "errors",
     "EngineError": "errors",
@@ -84,6 +89,8 @@ _HOMES = {
 }
 
 __all__ = [
+    "ActionError",
+    "Answer",
     "Card",
     "CardError",
     "Comparison",
@@ -102,6 +109,7 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "Question",
     "QuestionError",
     "Reading",
     "Record",

@@ -206,6 +206,8 @@ def _check(value: Value, written: object) -> None:
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
-        raise SettingError(f"{shown} is infinite, and infinity does not switch it off")
+        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
-        raise SettingError(f"{shown} would be infinite action; give a value above zero, or another unit")
+        off = off_values(setting)
+        instead = f"{off[0]:g} switches it off" if off else "give the smallest value above zero, or another unit"
+        raise SettingError(f"{shown} would be infinite action; {instead}")

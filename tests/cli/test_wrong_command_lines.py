@@ -91,14 +91,12 @@ SETTINGS = {
     ),
     f"convert fisher/provox GAIN=nan RESET=4 {_TO}": "fisher/provox: GAIN: is not a number (NaN)",
     f"convert fisher/provox GAIN=inf RESET=4 {_TO}": "fisher/provox: GAIN: "
-    "inf %/% is infinite, and infinity does not switch it off",
+    "inf %/% is infinite, and infinity does not switch it off here",
     f"convert fisher/provox GAIN=2,5 RESET=4 {_TO}": "fisher/provox: GAIN: '2,5' has a comma; write a decimal point",
     f"convert fisher/provox GAIN=two RESET=4 {_TO}": f"fisher/provox: GAIN: 'two' {_NUMBER}",
     f"convert fisher/provox GAIN=-2 RESET=4 {_TO}": "fisher/provox: GAIN: -2 %/% is outside 0 to inf %/%",
     f"convert fisher/provox GAIN=off RESET=4 {_TO}": ("fisher/provox: GAIN: cannot be switched off: the card states no off value"),
-    f"convert generic/standard K=1 Ti=0 {_TO}": (
-        "generic/standard: Ti: 0 s would be infinite action; give a value above zero, or another unit"
-    ),
+    f"convert generic/standard K=1 Ti=0 {_TO}": ("generic/standard: Ti: 0 s would be infinite action; inf switches it off"),
     f"convert honeywell/udc GAIN=2 RSET=80 {_TO}": ("honeywell/udc: RSET: 80 min/repeat is outside 0.02 to 50 min/repeat"),
     f"convert honeywell/udc GAIN=2 RSET=9000_s/repeat {_TO}": (
         "honeywell/udc: RSET: 150 min/repeat (given as 9000 s/repeat) is outside 0.02 to 50 min/repeat"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,10 @@ class Request:
         The process.
     digits : int or None
         Digits to round to.
+    bias : float or None
+        Output at SP = PV of a loop without integral action [% of the output span], where it was stated.
+    limits : tuple of float or None
+        Output limits of the source, where they were stated [%, or the units that its card computes in].
     compensate, allow_approximate, assume : bool
         As in `convert`.
     """
@@ -58,6 +63,8 @@ class Request:
     to_op_range: SignalRange | None = None
     process: Process | None = None
     digits: int | None = None
+    bias: float | None = None
+    limits: tuple[float, float] | None = None
     compensate: bool = False
     allow_approximate: bool = False
     assume: bool = False
@@ -66,7 +73,7 @@ class Request:
     @property
     def declared(self) -> tuple[float, float] | None:
         """The intervals that source and target compute with [s]."""
-        return None if self.scan is None else (self.scan[0] / self.pace[0], self.scan[1] / self.pace[1])
+        return None if self.scan is None else (_ratio(self.scan[0], self.pace[0]), _ratio(self.scan[1], self.pace[1]))
 
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
@@ -89,6 +96,10 @@ class Request:
             yield from ("--process", written(self.process))
         if self.digits not in (None, DIGITS):
             yield from ("--digits", str(self.digits))
+        if self.bias is not None:
+            yield from ("--bias", exactly(self.bias))
+        if self.limits is not None:
+            yield f"--limits={','.join(map(exactly, self.limits))}"
         if self.tag:
             yield from ("--tag", self.tag)
         flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
@@ -117,6 +128,8 @@ def read_request(
     to_op_range: object,
     process: Process | None,
     digits: object,
+    bias: float | None,
+    limits: tuple[float, float] | None,
     compensate: bool,
     allow_approximate: bool,
     assume: bool,
@@ -155,6 +168,8 @@ def read_request(
         to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
+        bias=bias,
+        limits=limits,
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,
@@ -174,7 +189,12 @@ def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float]
     source = real[0] if declared is None else declared[0]
     target = declared[1] if declared is not None and len(declared) == 2 else real[0]
     target_real = real[1] if len(real) == 2 else target
-    return (real[0], target_real), (real[0] / source, target_real / target)
+    return (real[0], target_real), (_ratio(real[0], source), _ratio(target_real, target))
+
+
+def _ratio(real: float, declared: float) -> float:
+    """Return a quotient of two numbers as they were typed: 0.02 over 0.2 is 0.1."""
+    return float(Fraction(repr(real)) / Fraction(repr(declared)))
 
 
 def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
