@@ -62,6 +62,14 @@ def test_the_code_of_the_page_gives_what_its_comments_say() -> None:
     assert checked > 60
 
 
+def test_choices_that_are_refused_for_one_reason_are_one_line() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    found = explained_choices(pidemu.convert(source, "emerson/deltav", emulate=False))
+    refused = [e for e in found if e.verdict == "refused"]
+    assert len({e.why for e in refused}) == len(refused)
+    assert [e.options for e in refused if "NL_GAP" in e.why] == ["FRSIPID_OPTS=nonlinear gain, and 15 more"]
+
+
 @pytest.mark.parametrize(("command", "printed"), CONSOLE.findall(TEXT))
 def test_a_command_prints_what_the_page_shows(command: str, printed: str) -> None:
     assert CliRunner().invoke(cli, shlex.split(command), prog_name="pidemu").output == printed
