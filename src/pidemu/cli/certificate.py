@@ -25,6 +25,7 @@ from pidemu.certificate.models import EXACT, Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 
@@ -132,7 +133,9 @@ def _side(title: str, s: Settings) -> None:
     ]
     table(["", "", "", "", ""], rows, right=(1,))
     if s.pace != 1:
-        click.echo(f"  executed at {number(s.pace)} times the interval it computes with: its times are that much longer")
+        click.echo(
+            f"  executed at {number(s.pace)} times the interval it computes with: its times are {number(s.pace)} times these"
+        )
 
 
 def _target(c: Conversion) -> None:
@@ -142,12 +145,16 @@ def _target(c: Conversion) -> None:
         wrapped(
             f"chosen automatically: {', '.join(f'{n}={x}' for n, x in c.chosen.items())} (--set to change, --explain for why)", "  "
         )
-    rows = []
+    rows, neutral = [], []
     for name, v in s.items():
-        if v.active:
+        if v.active and v.off and not is_computed(s.equation, name, v.role):
+            neutral.append(f"{name} {number(v.value)} {unit_of(v)}".rstrip())
+        elif v.active:
             rule = number(book[name].value) if book is not None and name in book else "-"
             rows.append([name, number(v.value), unit_of(v), other_units(v), rule])
     table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
+    if neutral:
+        wrapped(f"neutral, to be set so: {', '.join(neutral)}", "  ")
     if s.lag:
         click.echo(f"  in front of it, on PV: a first-order lag of {number(s.lag)} s")
     line = rounding_line(c.certificate, c.request.digits)

@@ -7,6 +7,7 @@ import click
 from pidemu.cli.common import number, print_json
 from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.target import is_computed
 from pidemu.errors import QuestionError
 from pidemu.settings import Settings
 
@@ -42,5 +43,9 @@ def _print(question: Question) -> None:
 def dials_line(c: Conversion) -> str:
     """Return a target's settings and options in one line."""
     s = c.settings
-    dials = [f"{name} = {number(v.value)} {v.unit}".removesuffix(" 1") for name, v in s.items() if v.active]
+    dials = [
+        f"{name} = {number(v.value)} {v.unit}".removesuffix(" 1")
+        for name, v in s.items()
+        if v.active and (is_computed(s.equation, name, v.role) or not v.off)
+    ]
     return f"{s.card.id}: {', '.join(dials)}" + (f" [{s.variant.choice_text}]" if s.options else "")
