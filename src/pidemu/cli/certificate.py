@@ -23,6 +23,7 @@ from pidemu.certificate.figures import (
 )
 from pidemu.certificate.models import Certificate, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
+from pidemu.conversion.document import refusal_document
 from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
@@ -36,16 +37,7 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     """Print why a target refuses, the nearest settings with their cost, and what could do instead."""
     nearest = error.nearest
     if as_json:
-        print_json(
-            {
-                "from": source.to_dict(),
-                "to": {"card": goal.id},
-                "verdict": "refused",
-                "reason": str(error),
-                "nearest": None if nearest is None else nearest.to_dict(),
-                "alternatives": list(error.alternatives),
-            }
-        )
+        print_json(refusal_document(error, {"from": source.to_dict(), "to": {"card": goal.id}}))
     click.echo(f"error: refused: {error}", err=True)
     if as_json:
         return

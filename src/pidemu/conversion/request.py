@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pidemu.action import read_action
 from pidemu.card.load import Card
@@ -62,15 +62,47 @@ class Request:
     assume: bool = False
     tag: str = ""
 
+    @property
+    def declared(self) -> tuple[float, float] | None:
+        """Intervals that source and target compute with [s]."""
+        if self.scan is None:
+            return None
+        source, target = (float(f"{h / r:.12g}") for h, r in zip(self.scan, self.pace, strict=True))
+        return source, target
+
+    @property
+    def runs_every(self) -> tuple[float, float] | None:
+        """Intervals at which both are executed, where these are others than those they compute with [s]."""
+        return self.scan if self.pace != (1.0, 1.0) else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was asked for as plain values for JSON, by the names of the arguments of `convert`."""
+        return {
+            "options": {n: str(x) for n, x in self.options.items()},
+            "given": {n: float(x) if isinstance(x, Real) else str(x) for n, x in self.given.items()},
+            "scan": self.declared and list(self.declared),
+            "runs_every": self.runs_every and list(self.runs_every),
+            "mode": self.mode,
+            "action": self.action,
+            "to_pv_range": range_text(self.pv_range),
+            "to_op_range": range_text(self.op_range),
+            "match": self.match,
+            "process": None if self.process is None else written(self.process),
+            "compensate": self.compensate,
+            "digits": self.digits,
+            "allow_approximate": self.allow_approximate,
+            "assume": self.assume,
+            "tag": self.tag,
+        }
+
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
         for name, value in {**self.options, **self.given}.items():
             yield from ("--set", f"{name}={exactly(value) if isinstance(value, float) else value}")
-        if self.scan is not None:
-            declared = tuple(h / r for h, r in zip(self.scan, self.pace, strict=True))
-            yield from ("--scan", _intervals(declared))
-            if self.pace != (1.0, 1.0):
-                yield from ("--runs-every", _intervals(self.scan))
+        if self.declared is not None:
+            yield from ("--scan", _intervals(self.declared))
+        if self.runs_every is not None:
+            yield from ("--runs-every", _intervals(self.runs_every))
         if self.mode != "both":
             yield from ("--mode", self.mode)
         for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
@@ -92,6 +124,11 @@ class Request:
 
 DIGITS = 5
 """Significant digits that the command line and the page print."""
+
+
+def range_text(ends: tuple[float, float] | None) -> str | None:
+    """Return a signal range as ``--pv-range`` takes it."""
+    return None if ends is None else f"{exactly(ends[0])},{exactly(ends[1])}"
 
 
 def _intervals(pair: tuple[float, ...]) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from datetime import date as Date
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
+from pidemu.conversion.document import provenance
 from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
@@ -25,6 +27,7 @@ from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
+    from pidemu.cutover.bench_check import BenchCheck
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
@@ -138,16 +141,21 @@ class Conversion:
         return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed)
 
     @cached_property
-    def at_the_loop(self) -> tuple[str, ...]:
-        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+    def bench_check(self) -> BenchCheck | ScanError:
+        """A check of the dials at the controller before the cut-over; the error where the target cannot be run for one."""
         from pidemu.cutover.bench_check import bench_check
 
-        lines = [f"action: {self.action_text}"]
         try:
-            lines.append(f"bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
+            return bench_check(self.settings, self.scan[1] if self.scan else None, self.action)
         except ScanError as error:
-            lines.append(f"no bench check: {error}")
-        return tuple(lines)
+            return error
+
+    @property
+    def at_the_loop(self) -> tuple[str, ...]:
+        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+        check = self.bench_check
+        bench = f"no bench check: {check}" if isinstance(check, ScanError) else f"bench check: {check.text}"
+        return f"action: {self.action_text}", bench
 
     @cached_property
     def command(self) -> str:
@@ -206,14 +214,23 @@ class Conversion:
         law = [text for a, text in found if a.makes_the_law]
         return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, the form of ``pidemu convert --json``."""
+    def to_dict(self, date: Date | None = None) -> dict[str, Any]:
+        """Return everything as plain values, the form of ``pidemu convert --json`` (specs/conversion.schema.json).
+
+        Parameters
+        ----------
+        date : datetime.date, optional
+            Date of the certificate; by default today.
+        """
+        check = self.bench_check
         plain = {
+            **provenance(self, date),
             "from": self.source.to_dict(),
             "to": self._target_dict(),
             "match": self.match,
             "verdict": self.verdict,
             "verdicts": self.verdicts,
+            "refusal": self.refusal,
             "sentence": self.sentence,
             "conditions": [c.to_dict() for c in self.conditions],
             "chosen": dict(self.chosen),
@@ -233,6 +250,8 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
+            "action": {"action": self.action, "text": self.action_text},
+            "bench_check": None if isinstance(check, ScanError) else asdict(check),
             "at_the_loop": list(self.at_the_loop),
             "command": self.command,
         }
