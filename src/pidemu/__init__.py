@@ -15,9 +15,11 @@ if TYPE_CHECKING:
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import convert
     from pidemu.conversion.result import Conversion
+    from pidemu.conversion.verify import Verification, verify
     from pidemu.emulator import Controller
     from pidemu.errors import (
         CardError,
+        CertificateError,
         ConversionRefusedError,
         EngineError,
         FleetError,
@@ -49,10 +51,13 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "Verification": "conversion.verify",
+    "verify": "conversion.verify",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",
     "Controller": "emulator",
     "CardError": "errors",
+    "CertificateError": "errors",
     "ConversionRefusedError": "errors",
     "EngineError": "errors",
     "FleetError": "errors",
@@ -80,6 +85,7 @@ _HOMES = {
 __all__ = [
     "Card",
     "CardError",
+    "CertificateError",
     "Comparison",
     "Controller",
     "Conversion",
@@ -103,6 +109,7 @@ __all__ = [
     "Settings",
     "Simulation",
     "UnitError",
+    "Verification",
     "__version__",
     "cards",
     "compare",
@@ -112,6 +119,7 @@ __all__ = [
     "read_record",
     "readings",
     "simulate",
+    "verify",
 ]
 
 

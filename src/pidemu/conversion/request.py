@@ -17,6 +17,7 @@ from pidemu.loop.text import written
 from pidemu.plain import exactly
 from pidemu.reading import signal_range
 from pidemu.scan.build import Action
+from pidemu.words import pair
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
@@ -131,8 +132,13 @@ def range_text(ends: tuple[float, float] | None) -> str | None:
     return None if ends is None else f"{exactly(ends[0])},{exactly(ends[1])}"
 
 
-def _intervals(pair: tuple[float, ...]) -> str:
-    return ",".join(exactly(h) for h in dict.fromkeys(pair))
+def read_range_text(text: str | None) -> tuple[float, float] | None:
+    """Return the signal range that `range_text` wrote."""
+    return None if text is None else pair(text)
+
+
+def _intervals(both: tuple[float, ...]) -> str:
+    return ",".join(exactly(h) for h in dict.fromkeys(both))
 
 
 def read_request(
