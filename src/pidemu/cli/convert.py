@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +101,9 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Action of the loop. Reverse: the output falls when the measurement rises (error SP - PV). Needed where a cut-over "
     "depends on it; where the sign of the gain is the action it is known.",
 )
+@click.option(
+    "--date", "day", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Date of the certificate; by default today."
+)
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
@@ -127,6 +131,7 @@ def command(
     to_op_range: tuple[float, float] | None,
     now: str | None,
     action: str | None,
+    day: datetime | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -180,12 +185,13 @@ def command(
         print_refusal(error, source, goal, as_json)
         raise SystemExit(1) from None
     plan, not_known = _plan(conversion, now)
+    date = None if day is None else day.date()
     if page is not None:
         from pidemu.report.certificate import write_page
 
-        write_page(page, conversion, plan)
+        write_page(page, conversion, plan, date=date)
     if as_json:
-        print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
+        print_json({**conversion.to_dict(date), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
     else:
         print_conversion(conversion)
         if plan is not None:
