@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +102,11 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     "depends on it; where the sign of the gain is the action it is known.",
 )
 @click.option(
-    "--date", "day", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Date of the certificate; by default today."
+    "--date",
+    type=click.DateTime(["%Y-%m-%d"]),
+    callback=lambda _ctx, _option, moment: moment and moment.date(),
+    metavar="YYYY-MM-DD",
+    help="Date of the certificate; by default today.",
 )
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
@@ -131,7 +135,7 @@ def command(
     to_op_range: tuple[float, float] | None,
     now: str | None,
     action: str | None,
-    day: datetime | None,
+    date: datetime.date | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -185,7 +189,6 @@ def command(
         print_refusal(error, source, goal, as_json)
         raise SystemExit(1) from None
     plan, not_known = _plan(conversion, now)
-    date = None if day is None else day.date()
     if page is not None:
         from pidemu.report.certificate import write_page
 

@@ -1,12 +1,12 @@
-"""A conversion, a question or a refusal as plain values: the form of ``--json``, with its version and what it takes to recompute it.
+"""A conversion, a question or a refusal as plain values, the form of ``--json``: with its version, and all to compute it again.
 
 ``specs/conversion.schema.json`` states the form, made by `pidemu.conversion.schema`.
 """
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
-from datetime import date as Date
 from typing import TYPE_CHECKING, Any, Final
 
 import pidemu
@@ -21,7 +21,7 @@ SCHEMA: Final = "pidemu-conversion-1"
 """Name and version of the form; a change that breaks a reader counts the version up."""
 
 
-def provenance(c: Conversion, date: Date | None = None) -> dict[str, Any]:
+def provenance(c: Conversion, date: datetime.date | None = None) -> dict[str, Any]:
     """Return what a certificate was made from: form, date, versions, and what was asked for.
 
     Parameters
@@ -34,7 +34,7 @@ def provenance(c: Conversion, date: Date | None = None) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "pidemu": pidemu.__version__,
-        "date": (date or Date.today()).isoformat(),
+        "date": (date or datetime.date.today()).isoformat(),
         "cards": card_versions(c),
         "request": {"from": source_as_given(c.source), "to": c.settings.card.id, **c.request.to_dict()},
     }

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from datetime import date as Date
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -214,7 +214,7 @@ class Conversion:
         law = [text for a, text in found if a.makes_the_law]
         return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
 
-    def to_dict(self, date: Date | None = None) -> dict[str, Any]:
+    def to_dict(self, date: datetime.date | None = None) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json`` (specs/conversion.schema.json).
 
         Parameters

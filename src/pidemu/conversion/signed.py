@@ -65,7 +65,9 @@ def _text(name: str) -> str:
         reason = error.strerror if isinstance(error, OSError) else error
         raise CertificateError(f"{name}: cannot be read: {reason}") from None
     if len(found) > LARGEST:
-        raise CertificateError(f"{name}: larger than {LARGEST // 2**20} MB, which no certificate is; name the file of one conversion")
+        raise CertificateError(
+            f"{name}: larger than {LARGEST // 2**20} MB, which no certificate is; name the file of one conversion"
+        )
     try:
         return found.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -104,7 +106,7 @@ def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 def _checked(name: str, plain: Any) -> Signed:
     form = plain.get("schema") if isinstance(plain, dict) else None
     if form is None:
-        raise CertificateError(f"{name}: not a certificate, as it does not begin with \"schema\": \"{SCHEMA}\"; {_AGAIN}")
+        raise CertificateError(f'{name}: not a certificate, as it does not begin with "schema": "{SCHEMA}"; {_AGAIN}')
     if form != SCHEMA:
         raise CertificateError(
             f"{name}: schema: the form is '{str(form)[:60]}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with the "

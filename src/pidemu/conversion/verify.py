@@ -110,7 +110,9 @@ class Verification:
         """What can have caused the changes; empty where there are none."""
         if self.unchanged:
             return ()
-        edited = "cards and pidemu have the versions of the certificate: the file was edited after pidemu wrote it, or this pidemu was"
+        edited = (
+            "cards and pidemu have the versions of the certificate: the file was edited after pidemu wrote it, or this pidemu was"
+        )
         return self.versions or (edited,)
 
     def to_dict(self) -> dict[str, Any]:
@@ -180,7 +182,9 @@ def _card(name: str, place: str, card: str, vendors: Sequence[str | Path]) -> Ca
     except CardNotFoundError as error:
         if not str(error).startswith("no card "):
             raise
-        raise CertificateError(f"{name}: {place}: there is no card '{card}'; name the folder that it lies in with --vendors DIR") from None
+        raise CertificateError(
+            f"{name}: {place}: there is no card '{card}'; name the folder that it lies in with --vendors DIR"
+        ) from None
 
 
 def _again(signed: Signed, source: Card, target: Card) -> Conversion:

@@ -1,9 +1,9 @@
-"""The certificate of a conversion as a page to print and sign: it stands alone, and the same conversion and date give the same bytes."""
+"""The certificate of a conversion as a page to print and sign: it stands alone; the same conversion and date, the same bytes."""
 
 from __future__ import annotations
 
+import datetime
 from dataclasses import replace
-from datetime import date as Date
 from pathlib import Path
 
 from pidemu.conversion.request import DIGITS
@@ -14,7 +14,7 @@ from pidemu.report.contents import Contents
 from pidemu.report.pages import template, write
 
 
-def certificate_page(conversion: Conversion, plan: TransferPlan | None = None, *, date: Date | None = None) -> str:
+def certificate_page(conversion: Conversion, plan: TransferPlan | None = None, *, date: datetime.date | None = None) -> str:
     """Return the certificate as an HTML page that needs nothing else: no script, no style sheet, no picture from elsewhere.
 
     Parameters
@@ -38,7 +38,7 @@ def certificate_page(conversion: Conversion, plan: TransferPlan | None = None, *
         Matplotlib or Jinja is not installed.
     """
     _check_extra()
-    return template("certificate.html.j2").render(page=Contents(as_printed(conversion), plan, date or Date.today()))
+    return template("certificate.html.j2").render(page=Contents(as_printed(conversion), plan, date or datetime.date.today()))
 
 
 def as_printed(c: Conversion) -> Conversion:
@@ -52,7 +52,9 @@ def as_printed(c: Conversion) -> Conversion:
     return converted(c.source, c.settings.card, request, emulate=emulated)
 
 
-def write_page(path: str | Path, conversion: Conversion, plan: TransferPlan | None = None, *, date: Date | None = None) -> None:
+def write_page(
+    path: str | Path, conversion: Conversion, plan: TransferPlan | None = None, *, date: datetime.date | None = None
+) -> None:
     """Write the certificate as an HTML page.
 
     Parameters

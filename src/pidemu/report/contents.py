@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date as Date
 from typing import TYPE_CHECKING, Final
 
 import pidemu
@@ -23,7 +23,6 @@ from pidemu.conversion.statement import (
     pace_line,
     ranges_line,
     sections,
-    side_title,
     source_rows,
     target_rows,
     unverified,
@@ -91,7 +90,7 @@ class Contents:
     band_columns = BAND_COLUMNS
     exactly = staticmethod(exactly)
 
-    def __init__(self, conversion: Conversion, plan: TransferPlan | None, date: Date) -> None:
+    def __init__(self, conversion: Conversion, plan: TransferPlan | None, date: datetime.date) -> None:
         self.c = conversion
         self.plan = plan
         self.date = date.isoformat()
@@ -125,7 +124,7 @@ class Contents:
     def source(self) -> Side:
         """The old controller as it was found, which is also the way back."""
         s = self.c.source
-        return Side("source", side_title(s), source_rows(s), list(self._facts(s, 0, action_line(s, self.c.action))))
+        return Side("source", s.card.title, source_rows(s), list(self._facts(s, 0, action_line(s, self.c.action))))
 
     @property
     def target(self) -> Side:
@@ -133,15 +132,23 @@ class Contents:
         s = self.c.settings
         facts = list(self._facts(s, 1, self.c.action_text))
         rounding = rounding_line(self.certificate, self.c.request.digits)
-        return Side("target", side_title(s), target_rows(self.c), [*facts, *([("rounding", rounding)] if rounding else [])])
+        return Side("target", s.card.title, target_rows(self.c), [*facts, *([("rounding", rounding)] if rounding else [])])
 
     def _facts(self, s: Settings, side: int, action: str) -> Iterator[tuple[str, str]]:
         scans, real = self.c.request.declared, self.c.request.runs_every
+        if s.options:
+            yield "options", ", ".join(f"{n}={x}{self._how(side, n)}" for n, x in s.options.items())
         yield "action", action
         yield "ranges", ranges_line(s).removeprefix("ranges: ") or "not given"
         scan = "not given" if scans is None else f"{number(scans[side])} s"
         executed = f", executed every {number(real[side])} s" if real is not None and scans is not None else ""
         yield "scan", scan + executed + (f"; {pace_line(s)}" if pace_line(s) else "")
+
+    def _how(self, side: int, option: str) -> str:
+        """Return how an option came about, where it was not stated."""
+        if side == 0:
+            return " (not stated)" if option in self.c.source.defaulted else ""
+        return " (chosen automatically)" if option in self.c.chosen else ""
 
     def as_found(self, row: Row) -> str:
         """Return how a dial of the source was written, where that is not its value in the card's unit."""
@@ -169,7 +176,8 @@ class Contents:
             yield "chosen", chosen_line(c)
         yield "match", f"{c.match}: {MATCHES[c.match]}" + ("" if request.match is None else ", as asked for")
         yield "mode", _MODES[request.mode] + (", as nothing was stated" if request.mode == "both" else "")
-        yield "action", "not stated" if c.action is None else f"{c.action}, {'as stated' if request.action else 'by the sign of the gain'}"
+        by = "as stated" if request.action else "by the sign of the gain"
+        yield "action", "not stated" if c.action is None else f"{c.action}, {by}"
         yield "scan interval", self._scans()
         if c.factor != 1:
             yield "gain", f"multiplied by {number(c.factor)} for the new ranges or the new action"
@@ -189,8 +197,8 @@ class Contents:
     def _scans(self) -> str:
         scan, emulated = self.c.scan, self.certificate.scan_by_scan
         if scan is not None:
-            compensated = "; the settings make up for them" if self.certificate.compensated else "; the settings do not depend on them"
-            return f"{number(scan[0])} s before, {number(scan[1])} s after{compensated}"
+            how = "make up for" if self.certificate.compensated else "do not depend on"
+            return f"{number(scan[0])} s before, {number(scan[1])} s after; the settings {how} them"
         return f"not given; {number(emulated.scan[0])} s taken to run both" if emulated is not None else "not given"
 
     @property
