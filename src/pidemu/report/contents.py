@@ -244,14 +244,14 @@ class Contents:
             yield self._loops()
 
     def _bode(self) -> Picture:
-        found, band = bode(self.c), self.certificate.headline.loop_band
+        found, c = bode(self.c), self.certificate
+        band = (c.feedback_at_scan or c.feedback).loop_band
         apart = f"differ by up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)}"
         how = "at the scan intervals, held from scan to scan" if self.c.scan else "continuous"
         return Picture(
             f"Measurement to output ({how})",
             bode_picture(found, self.names),
-            f"Gain and phase of both controllers over frequency, and target per source. In the loop band the "
-            f"{'laws at the scans' if self.certificate.compensated else 'continuous laws'} "
+            f"Gain and phase of both controllers over frequency, and target per source. In the loop band they "
             f"{apart if band.max_deviation >= EXACT else 'do not differ'}.",
         )
 
