@@ -36,12 +36,18 @@ CONVERSIONS: dict[str, tuple[str, ...]] = {
     "nearest settings": ("generic/standard", "K=2", "Ti=10", "Td=4", "--to", "fisher/provox", "--allow-approximate"),
     "assumed": ("honeywell/tdc3000", "K=2", "T1=1", "T2=0.1", "--to", "emerson/deltav", "--assume"),
     "ranges": ("generic/standard", "K=2", "Ti=10", "--pv-range", "0,100", "--to", "generic/series", "--to-pv-range", "0,200"),
-    "executed at another interval": ("generic/standard", "K=2", "Ti=10", "--to", "emerson/deltav", "--scan", "0.2", "--runs-every", "0.1"),
-    "integers": ("generic/standard", "K=2.1", "Ti=33", "Td=2", "Tf=0.2", "--to", "iec/61131-3-pid", "--scan", "0.5", "--allow-approximate"),
+    "executed at another interval": (
+        "generic/standard", "K=2", "Ti=10", "--to", "emerson/deltav", "--scan", "0.2", "--runs-every", "0.1",
+    ),
+    "integers": (
+        "generic/standard", "K=2.1", "Ti=33", "Td=2", "Tf=0.2", "--to", "iec/61131-3-pid", "--scan", "0.5", "--allow-approximate",
+    ),
     "options and dials of the target": (
         "fisher/provox", "GAIN=2", "RESET=4", "--to", "emerson/deltav", "--set", "FORM=Standard", "--set", "ALPHA=0.2",
     ),
-    "a match by name": ("generic/standard", "K=2", "Ti=30", "Td=2", "Tf=0.2", "--to", "fisher/provox", "--match", "frequency:0.07rad/s"),
+    "a match by name": (
+        "generic/standard", "K=2", "Ti=30", "Td=2", "Tf=0.2", "--to", "fisher/provox", "--match", "frequency:0.07rad/s",
+    ),
 }  # fmt: skip
 OTHERS: dict[str, tuple[str, ...]] = {
     "question": ("honeywell/tdc3000", "K=2", "T1=1", "T2=0.1", "--to", "emerson/deltav"),
@@ -149,6 +155,6 @@ def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
             "card": "generic/standard", "settings": {"K": 2.0, "Ti": "0.5 min"}, "options": {}, "pv_range": "0,100",
             "op_range": "0,50",
         },
-        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5], "to_pv_range": "0,200", "to_op_range": "0,50",
-        "process": "gain=0.8,lag=20,delay=3",
+        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5], "to_pv_range": "0,200",
+        "to_op_range": "0,50", "process": "gain=0.8,lag=20,delay=3",
     }  # fmt: skip

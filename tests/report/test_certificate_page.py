@@ -53,7 +53,9 @@ MADE: dict[str, tuple[str, dict[str, object], str, dict[str, Any]]] = {
     "a process": ("fisher/provox", PROVOX, "emerson/deltav", {"scan": (1.0, 0.5), "process": PROCESS}),
     "rounded": ("generic/standard", {**STANDARD, "Td": 8, "Tf": 1}, "honeywell/udc", {}),
     "asked": (
-        "honeywell/tdc3000", {"K": 2, "T1": 1, "T2": "6 s", "pv_range": (0, 400), "op_range": (0, 100)}, "emerson/deltav",
+        "honeywell/tdc3000",
+        {"K": 2, "T1": 1, "T2": "6 s", "pv_range": (0, 400), "op_range": (0, 100)},
+        "emerson/deltav",
         {"assume": True, "action": "direct", "tag": "TIC-101", "mode": "auto"},
     ),
 }
@@ -223,7 +225,9 @@ def test_the_dials_are_printed_as_they_were_found() -> None:
 def test_the_head_names_loop_date_and_versions() -> None:
     c, head = made("asked"), words(tree(page("asked")).find("body/header"))
     assert head.startswith("TIC-101: conversion certificate honeywell/tdc3000 → emerson/deltav")
-    cards = [f"{s.card.id} {hashlib.sha256(Path(s.card.document.path).read_bytes()).hexdigest()[:12]}" for s in (c.source, c.settings)]
+    cards = [
+        f"{s.card.id} {hashlib.sha256(Path(s.card.document.path).read_bytes()).hexdigest()[:12]}" for s in (c.source, c.settings)
+    ]
     assert f"2026-07-01, pidemu {pidemu.__version__} cards: {', '.join(cards)}" in head
     assert words(tree(page("exact")).find("body/header/div/h1")) == "Conversion certificate"
 
@@ -410,7 +414,19 @@ def test_the_same_conversion_gives_the_same_bytes() -> None:
 
 
 def test_another_process_writes_the_same_bytes(folder: Path) -> None:
-    order = ["convert", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--scan", "1,0.5", "--date", "2026-07-01"]
+    order = [
+        "convert",
+        "fisher/provox",
+        "GAIN=2",
+        "RESET=4",
+        "RATE=0.1",
+        "--to",
+        "emerson/deltav",
+        "--scan",
+        "1,0.5",
+        "--date",
+        "2026-07-01",
+    ]
     environment = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo", "LC_ALL": "C"}
     command = [sys.executable, "-m", "pidemu", *order, "--html", "x.html"]
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -432,7 +448,9 @@ ASKED: dict[str, tuple[str, dict[str, object], str, dict[str, Any]]] = {
     "crossover": ("generic/standard", STANDARD, "fisher/provox", {"match": "frequency", "process": PROCESS}),
     "the nearest": ("generic/standard", STANDARD, "honeywell/tdc3000", {"match": "constrained"}),
     "low-frequency": ("generic/standard", STANDARD, "gnc-tools/cpid", {"match": "low-frequency"}),
-    "options of the source": ("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.1, "CTEQN": "B", "FORM": "ideal"}, "generic/standard", {}),
+    "options of the source": (
+        "honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.1, "CTEQN": "B", "FORM": "ideal"}, "generic/standard", {},
+    ),
     "ranges": (
         "generic/standard", {**STANDARD, "pv_range": (-50, 150), "op_range": (0, 10)}, "arduino/pid",
         {"to_pv_range": (0, 100), "to_op_range": (-5, 5), "allow_approximate": True},

@@ -123,6 +123,8 @@ class Request:
         yield from (flag for flag, wanted in flags.items() if wanted)
 
 
+_SHORTEST, _LONGEST = 1e-9, 1e9
+"""Intervals beyond these are mistakes, and what is computed from them leaves the range of floating point [s]."""
 DIGITS = 5
 """Significant digits that the command line and the page print."""
 
@@ -230,4 +232,6 @@ def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
         found = ()
     if not found or not all(math.isfinite(h) and h > 0 for h in found):
         raise ScanError(f"{name} is {given!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
+    if not all(_SHORTEST <= h <= _LONGEST for h in found):
+        raise ScanError(f"{name} is {given!r}; no controller is executed at such intervals, which are in seconds")
     return found

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 import pidemu
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
@@ -25,8 +27,8 @@ DIAL: Final = 1e-6
 FIGURE: Final = 1e-4
 """The same of a figure: the largest of a curve, the root of a margin and the area of a response are found that exactly, and are
 printed to two to four digits."""
-ZERO: Final = 1e-6
-"""Difference of figures that is only rounding of what is zero [%, dB, deg, s]."""
+ZERO: Final = 1e-5
+"""Difference of figures that is none, whatever their size: what rounding dials to five digits makes of zero [1, dB, deg, s]."""
 _PLACES: Final = frozenset({"worst_at", "largest_at", "segment", "text"})
 """What is not compared: where a largest value is, which jumps between equal ones, and wording."""
 SHORT: Final = 12
@@ -163,11 +165,12 @@ def verify(certificate: str | Path | Mapping[str, Any], vendors: Sequence[str | 
     name, signed = read_signed(certificate)
     source, target = (_card(name, place, card, vendors) for place, card in _cards(signed))
     versions = {source.id: source.digest, target.id: target.digest}
-    try:
-        found = _again(signed, source, target)
-    except PidemuError as error:
-        return Verification(name, signed, None, (Change("conversion", "", signed.verdict, _outcome(error)),), versions)
-    return Verification(name, signed, found, tuple(_changes(signed, found)), versions | card_versions(found))
+    with np.errstate(all="ignore"):  # a file may hold any number
+        try:
+            found = _again(signed, source, target)
+        except PidemuError as error:
+            return Verification(name, signed, None, (Change("conversion", "", signed.verdict, _outcome(error)),), versions)
+        return Verification(name, signed, found, tuple(_changes(signed, found)), versions | card_versions(found))
 
 
 def _cards(signed: Signed) -> tuple[tuple[str, str], tuple[str, str]]:
