@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 import pidemu
+from pidemu.algorithm import Gate
 from pidemu.loop.closed import closed_loop
 from pidemu.loop.experiment import Steps, experiment
 from pidemu.scan.build import build
@@ -42,7 +43,9 @@ class Numbers:
 def program(numbers: Numbers = Numbers()) -> Program:
     """Return the closed loop as a program that reads setpoint and load."""
     dials = {"kp": numbers.kp, "ki": numbers.ki, "kd": numbers.kd, "Tf": numbers.Tf, "b": 1, "c": 0}
-    algorithm = replace(pidemu.load_card("generic/parallel").settings(dials).algorithm(), windup="conditional")
+    algorithm = replace(
+        pidemu.load_card("generic/parallel").settings(dials).algorithm(), windup="conditional", gate=Gate(drops=True)
+    )
     controller = build(algorithm, H, limits=(0.0, 100.0))
     at_rest = {"u": 50.0, "I": 50.0, "x1": 50.0, "on": 1.0, "begun": 1.0}
     controller = replace(controller, initial=tuple(at_rest.get(q.name, 0.0) for q in controller.states))

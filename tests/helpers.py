@@ -23,7 +23,7 @@ from pidemu.errors import SettingError
 from pidemu.scan.program import Program
 from pidemu.settings import Settings, limits, off_values
 from pidemu.targets.python import compiled
-from pidemu.units import Role, from_canonical, parse_unit
+from pidemu.units import Role, Spans, from_canonical, parse_unit
 
 Floats = npt.NDArray[np.float64]
 
@@ -43,6 +43,7 @@ _SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
     Role.TRACKING_TIME: st.floats(1, 3000),
     Role.FILTER_FACTOR: st.just(1.0) | st.floats(0.1, 1),
     Role.INTEGRAL_LIMIT: st.floats(5, 500),
+    Role.WINDUP_LIMIT: st.floats(60, 120),
     Role.DEADBAND: st.just(0.0) | st.floats(0.1, 10),
     Role.GAP_GAIN: st.floats(0, 1),
     Role.LINEARITY: st.just(1.0) | st.floats(0.1, 1),
@@ -72,13 +73,13 @@ def dial_values(draw: st.DrawFn, setting: Setting) -> float:
     if off and draw(st.integers(0, 7)) == 0:
         return draw(st.sampled_from(off))
     role = Role(setting.sets)
-    value = from_canonical(role, draw(_SENSIBLE[role]), parse_unit(setting.unit))
+    value = from_canonical(role, draw(_SENSIBLE[role]), parse_unit(setting.unit), Spans(scan=0.5))
     low, high = limits(setting)
     value = min(max(value, low), high)
     if setting.resolution is not None:
         value = min(max(round(value / setting.resolution) * setting.resolution, low), high)
     if math.isinf(value) and value not in off:  # a derivative of zero has no value on a dial that cannot show it
-        value = from_canonical(role, 1.0, parse_unit(setting.unit))
+        value = from_canonical(role, 1.0, parse_unit(setting.unit), Spans(scan=0.5))
     return value
 
 

@@ -213,7 +213,9 @@ def test_engineering_gains_stay_as_they_are_in_the_cards_own_units() -> None:
     assert (percent.kp, percent.ki, percent.kd) == (12.0, 2.0, 8.0)
 
 
-@pytest.mark.parametrize("value", [(0,), (100, 0), (0, 0), (0, math.inf), (math.nan, 1), "0..100", "12", 5, (0, "x")])
+@pytest.mark.parametrize(
+    "value", [(0,), (100, 0), (0, 0), (0, math.inf), (math.nan, 1), "0..", "12", 5, (0, "x"), (0, 1, 2), (False, 1)]
+)
 @pytest.mark.parametrize("name", ["pv_range", "op_range"])
 def test_a_signal_range_must_be_two_rising_numbers(name: str, value: object) -> None:
     assert refusal(card(), **{name: value}).startswith(f"nobody/bench: {name}: ")

@@ -34,6 +34,7 @@ def fits(role: Role, unit: str) -> bool:
 
 
 DIALS = [(role, unit) for role in Role for unit in UNITS if fits(role, unit)]
+SCAN = Spans(scan=0.5)
 INTEGRAL_FACTORS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
 
 
@@ -62,6 +63,20 @@ INTEGRAL_FACTORS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(6
         pytest.param(Role.FILTER_RATIO, 12.5, "%", Spans(), 0.125, id="filter ratio in percent"),
         pytest.param(Role.PROPORTIONAL_WEIGHT, 0.7, "1", Spans(), 0.7, id="setpoint weight"),
         pytest.param(Role.MULTIPLIER, 3.0, "1", Spans(), 3.0, id="overall multiplier"),
+        pytest.param(Role.SETPOINT_RATE, 0.25, "eu/scan", Spans(pv=200.0, scan=0.5), 0.25, id="0.25 EU of 200 each half second"),
+        pytest.param(Role.OUTPUT_RATE, 5.0, "%/scan", Spans(scan=0.25), 20.0, id="percent per scan of a quarter second"),
+        pytest.param(Role.INTEGRAL, 0.05, "1/scan", Spans(scan=0.5), 0.1, id="integral gain per scan of half a second"),
+        pytest.param(Role.INTEGRAL, 40.0, "scan/repeat", Spans(scan=0.5), 0.05, id="40 scans of half a second: 20 s"),
+        pytest.param(Role.INTEGRAL, 0.125, "repeat/scan", Spans(scan=0.5), 0.25, id="repeats per scan"),
+        pytest.param(Role.DERIVATIVE, 8.0, "scan", Spans(scan=0.25), 2.0, id="derivative time in scans"),
+        pytest.param(Role.FILTER_TIME, 3.0, "scan", Spans(scan=2.0), 6.0, id="filter time in scans"),
+        pytest.param(Role.GAIN, 50.0, "degC", Spans(pv=200.0), 4.0, id="band in the degrees of the range"),
+        pytest.param(Role.GAIN, 90.0, "degF", Spans(pv=200.0, degree=Fraction(1)), 4.0, id="90 degF are 50 K, of 0 to 200 degC"),
+        pytest.param(Role.GAIN, 50.0, "K", Spans(pv=360.0, degree=Fraction(5, 9)), 4.0, id="50 K, of 0 to 360 degF"),
+        pytest.param(Role.GAIN, 0.5, "%/degF", Spans(pv=200.0, degree=Fraction(1)), 1.8, id="percent per degF, range in degC"),
+        pytest.param(Role.DEADBAND, 9.0, "degF", Spans(pv=50.0, degree=Fraction(1)), 10.0, id="9 degF are 5 K, of 50"),
+        pytest.param(Role.SETPOINT_RATE, 3.0, "degC/min", Spans(pv=200.0), 0.025, id="3 K per minute, of 200"),
+        pytest.param(Role.SETPOINT_RATE, 1.0, "K/scan", Spans(pv=50.0, scan=0.5), 4.0, id="1 K each half second, of 50"),
     ],
 )
 def test_a_dial_means_what_section_1_says_and_back(role: Role, dial: float, unit: str, spans: Spans, canonical: float) -> None:
@@ -96,6 +111,12 @@ def test_a_dial_means_what_section_1_says_and_back(role: Role, dial: float, unit
         ("psi/in", "eu/eu"),
         ("psi per inch", "eu/eu"),
         ("", "1"),
+        ("samples", "scan"),
+        ("EU per scan", "eu/scan"),
+        ("repeats/scan", "repeat/scan"),
+        ("°C", "degC"),
+        ("degF per minute", "degF/min"),
+        ("k/h", "K/h"),
     ],
 )
 def test_people_spell_units_in_many_ways(written: str, name: str) -> None:
@@ -173,7 +194,7 @@ def test_a_unit_of_the_wrong_dimension_is_refused_with_units_that_fit(role: Role
     with pytest.raises(UnitError) as caught:
         to_canonical(role, 1.0, UNITS[unit])
     message = str(caught.value)
-    assert message.startswith(f"'{unit}' is {UNITS[unit].dimension.value} and cannot set {role.value.replace('-', ' ')}; ")
+    assert message.startswith(f"'{unit}' is {UNITS[unit].meaning} and cannot set {role.value.replace('-', ' ')}; ")
     offered = message.split("use one of: ")[1].split(", ")
     assert all(fits(role, name) for name in offered)
 
@@ -201,7 +222,7 @@ def test_a_reset_rate_becomes_an_integral_time_by_exact_arithmetic_rounded_once(
 
 @given(dial=st.sampled_from(DIALS), value=st.floats(1e-9, 1e9), pv=st.floats(0.01, 1e5), op=st.floats(0.01, 1e5))
 def test_a_dial_value_survives_the_way_to_canonical_and_back(dial: tuple[Role, str], value: float, pv: float, op: float) -> None:
-    role, unit, spans = dial[0], UNITS[dial[1]], Spans(pv, op)
+    role, unit, spans = dial[0], UNITS[dial[1]], Spans(pv, op, 0.3)
     there = to_canonical(role, value, unit, spans)
     # each way rounds once, by half a unit in the last place: 2^-53 each, of the value or of its reciprocal
     assert math.isclose(value, from_canonical(role, there, unit, spans), rel_tol=2**-51)
@@ -215,7 +236,7 @@ def test_a_conversion_between_dials_keeps_the_canonical_value(
     role: Role, value: float, pv: float, op: float, data: st.DataObject
 ) -> None:
     units = st.sampled_from([UNITS[unit] for r, unit in DIALS if r is role])
-    old, new, spans = data.draw(units), data.draw(units), Spans(pv, op)
+    old, new, spans = data.draw(units), data.draw(units), Spans(pv, op, 0.3, Fraction(1))
     converted = convert_unit(role, value, old, new, spans)
     # three roundings: the conversion, and one canonical value on either side
     assert math.isclose(to_canonical(role, value, old, spans), to_canonical(role, converted, new, spans), rel_tol=2**-50)
@@ -223,15 +244,15 @@ def test_a_conversion_between_dials_keeps_the_canonical_value(
 
 @pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if is_reciprocal(r, UNITS[u])])
 def test_zero_and_infinity_change_places_on_a_reciprocal_dial(role: Role, unit: str) -> None:
-    assert to_canonical(role, math.inf, UNITS[unit]) == 0.0
-    assert math.inf == from_canonical(role, 0.0, UNITS[unit])
-    assert math.inf == to_canonical(role, 0.0, UNITS[unit])
+    assert to_canonical(role, math.inf, UNITS[unit], SCAN) == 0.0
+    assert math.inf == from_canonical(role, 0.0, UNITS[unit], SCAN)
+    assert math.inf == to_canonical(role, 0.0, UNITS[unit], SCAN)
 
 
 @pytest.mark.parametrize(("role", "unit"), [(r, u) for r, u in DIALS if not is_reciprocal(r, UNITS[u])])
 def test_zero_and_infinity_stay_themselves_on_a_direct_dial(role: Role, unit: str) -> None:
-    assert to_canonical(role, 0.0, UNITS[unit]) == 0.0
-    assert math.inf == to_canonical(role, math.inf, UNITS[unit])
+    assert to_canonical(role, 0.0, UNITS[unit], SCAN) == 0.0
+    assert math.inf == to_canonical(role, math.inf, UNITS[unit], SCAN)
 
 
 def test_only_bands_integral_times_and_frequencies_are_reciprocal() -> None:
@@ -248,3 +269,30 @@ def test_only_bands_integral_times_and_frequencies_are_reciprocal() -> None:
 def test_an_integral_time_of_infinity_is_no_repeats_per_minute() -> None:
     assert convert_unit(Role.INTEGRAL, math.inf, UNITS["s/repeat"], UNITS["repeat/min"]) == 0.0
     assert math.inf == convert_unit(Role.INTEGRAL, 0.0, UNITS["repeat/min"], UNITS["s/repeat"])
+
+
+def test_what_counts_in_scans_needs_the_scan_interval() -> None:
+    with pytest.raises(UnitError, match="'eu/scan' counts in scans, and the scan interval is not known"):
+        to_canonical(Role.SETPOINT_RATE, 1.0, UNITS["eu/scan"])
+
+
+@pytest.mark.parametrize(
+    ("role", "value", "old", "new", "expected"),
+    [
+        (Role.GAIN, 9.0, "degF", "degC", 5.0),
+        (Role.GAIN, 1.0, "%/degC", "%/degF", 5 / 9),
+        (Role.DEADBAND, 5.0, "K", "degF", 9.0),
+        (Role.SETPOINT_RATE, 120.0, "degC/h", "K/min", 2.0),
+    ],
+)
+@pytest.mark.parametrize("pv", [1.0, 100.0, 350.0])
+def test_one_kind_of_degree_becomes_another_whatever_the_range(
+    role: Role, value: float, old: str, new: str, expected: float, pv: float
+) -> None:
+    assert expected == convert_unit(role, value, UNITS[old], UNITS[new], Spans(pv=pv))
+
+
+@pytest.mark.parametrize(("role", "unit", "other"), [(Role.BIAS, "degC", "eu"), (Role.OUTPUT_RATE, "degF/min", "eu/min")])
+def test_the_output_is_not_measured_in_degrees(role: Role, unit: str, other: str) -> None:
+    with pytest.raises(UnitError, match=f"belongs to the output; use '{other}'"):
+        check_unit(role, UNITS[unit])

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
         SettingError,
         UnitError,
     )
+    from pidemu.explanation.explain import explain
+    from pidemu.explanation.model import Explanation
     from pidemu.fleet.fleet import Fleet
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
@@ -68,6 +70,8 @@ _HOMES = {
     "SettingError": "errors",
     "UnitError": "errors",
     "Event": "signals",
+    "Explanation": "explanation.model",
+    "explain": "explanation.explain",
     "Fleet": "fleet.fleet",
     "FleetResult": "fleet.result",
     "Loop": "fleet.loops",
@@ -92,6 +96,7 @@ __all__ = [
     "ConversionRefusedError",
     "EngineError",
     "Event",
+    "Explanation",
     "Fleet",
     "FleetError",
     "FleetResult",
@@ -114,6 +119,7 @@ __all__ = [
     "cards",
     "compare",
     "convert",
+    "explain",
     "load_card",
     "read_loops",
     "read_record",

@@ -93,8 +93,12 @@ class Gate:
         After a freeze the trapezoidal rule goes on from the last error that was integrated.
     by_output_sign : bool
         `conditional` judges by the sign of error times output.
+    drops : bool
+        `conditional` drops an increment that leads beyond a limit, instead of keeping what leads to the limit.
     fast_return : float
-        Factor on an increment that leads back from a limit.
+        With `external-reset`: factor on an increment that leads back from beyond `fast_beyond`.
+    fast_beyond : tuple of float
+        Low and high limit of the output for that [%].
     clamped : bool
         `recompute` limits the integral to the output limits as well.
     """
@@ -105,7 +109,9 @@ class Gate:
     unless_smaller: bool = False
     from_integrated: bool = False
     by_output_sign: bool = False
+    drops: bool = False
     fast_return: float = 1.0
+    fast_beyond: tuple[float, float] = (-math.inf, math.inf)
     clamped: bool = False
 
 
@@ -211,8 +217,10 @@ class Algorithm:
         Filters before the algorithm.
     previous_pv : bool
         The measurement of the previous scan is used.
-    sp_rate : float
-        Fastest change of the setpoint [%/s].
+    sp_rate, sp_rate_down : float
+        Fastest rise and fall of the setpoint [%/s].
+    sp_rate_local : bool
+        In cascade the remote setpoint is not limited.
     sp_from_zero, sp_tracks : bool
         The limited setpoint starts at zero; the setpoint follows the measurement in manual.
     shape : Shape, optional
@@ -277,6 +285,8 @@ class Algorithm:
     e_filter: Lag | None = None
     previous_pv: bool = False
     sp_rate: float = math.inf
+    sp_rate_down: float = math.inf
+    sp_rate_local: bool = False
     sp_from_zero: bool = False
     sp_tracks: bool = False
     shape: Shape | None = None
@@ -306,7 +316,7 @@ class Algorithm:
     @property
     def derivative_per_gain(self) -> float:
         """``kd/kp`` [s]: the derivative time that the integral of the series form sees."""
-        none = isinstance(self.kd, float | int) and not self.kd  # the numbers may be arrays
+        none = getattr(self.kd, "ndim", 0) == 0 and not self.kd  # the numbers may be arrays
         return 0.0 if none else self.kd / self.kp
 
     def too_coarse(self, h: float) -> list[str]:
@@ -330,7 +340,7 @@ class Algorithm:
         if pace == 1:
             return self
         lags = {
-            name: lag if lag is None or lag.factor != 1 else replace(lag, time=lag.time * pace)  # a share per scan is one anyway
+            name: None if lag is None else replace(lag, time=lag.time * pace)
             for name, lag in (("sp_filter", self.sp_filter), ("pv_filter", self.pv_filter), ("e_filter", self.e_filter))
         }
         return replace(
@@ -352,10 +362,12 @@ class Algorithm:
         return replace(
             self,
             precision="float64",
+            gate=replace(self.gate, fast_return=1.0, fast_beyond=(-math.inf, math.inf)),
             shape=None,
             integral_deadband=None,
             integral_limits=None,
             sp_rate=math.inf,
+            sp_rate_down=math.inf,
             output_rate=math.inf,
             output_deadband=0.0,
             resolution=0.0,
@@ -372,8 +384,13 @@ class Algorithm:
             found.append(f"error: {name}{band}")
         if self.integral_deadband:
             found.append(f"integral deadband of {self.integral_deadband:g}")
+        if self.ki and self.gate.fast_return != 1:
+            low, high = self.gate.fast_beyond
+            found.append(f"integral {self.gate.fast_return:g} times as fast on the way back from below {low:g} or above {high:g}")
         if math.isfinite(self.sp_rate):
             found.append(f"setpoint rate limit of {self.sp_rate:g} per s")
+        if math.isfinite(self.sp_rate_down) and self.sp_rate_down != self.sp_rate:
+            found.append(f"setpoint rate limit of {self.sp_rate_down:g} per s downwards")
         if math.isfinite(self.output_rate):
             found.append(f"output rate limit of {self.output_rate:g} per s")
         if self.output_deadband:

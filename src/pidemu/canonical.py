@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pidemu.algorithm import Algorithm, Dahlin, Gate, Lag, Place, Shape
 from pidemu.card.base import Form, Rule
-from pidemu.card.integral import IntegralLimits, WindupBackCalculation, WindupExternalReset, WindupGate, WindupRecompute
+from pidemu.card.integral import (
+    FastReturn,
+    IntegralLimits,
+    WindupBackCalculation,
+    WindupExternalReset,
+    WindupGate,
+    WindupRecompute,
+)
 from pidemu.card.models import Equation
 from pidemu.card.terms import ErrorShape, Filter, Measurement, Setpoint
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings import Settings
-from pidemu.units import Role, Spans, parse_quantity, parse_unit, to_canonical
+from pidemu.units import Dimension, Role, Spans, parse_quantity, parse_unit, to_canonical
 
 
 def default_scan(equation: Equation) -> float:
@@ -28,16 +35,37 @@ def gain_sign(equation: Equation) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
-    """Reads a card's dials and numbers in canonical units."""
+class Reader:
+    """Reads a card's dials and numbers in canonical units, or in the controller's own."""
 
     settings: Settings
     spans: Spans
+    own: bool = False
 
     def value(self, name: str) -> float:
         """Return a dial's canonical value; 0 where it is off."""
         value = self.settings[name]
-        return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self.spans)
+        return 0.0 if value.off else to_canonical(value.role, value.value, parse_unit(value.unit), self._spans_for(value.role))
+
+    def _spans_for(self, role: Role) -> Spans:
+        """Return what a dial refers to; a gain in own units, by which the output moves over its range, to the output's span."""
+        if self.own and role is Role.GAIN:
+            span = self.settings.spans.op
+            return replace(self.spans, pv=span, op=span)
+        return self.spans
+
+    def level_of_output(self, given: str | float | None) -> float:
+        """Return a deadband of the output, which a dial for one of the measurement may hold too; 0 where there is none."""
+        return replace(self, spans=replace(self.spans, pv=self.spans.op)).pick(given, 0.0)
+
+    def number(self, x: float) -> float:
+        """Return a constant of the card."""
+        return x
+
+    @property
+    def span_ratio(self) -> float:
+        """Percent gain that one output unit per measurement unit amounts to [%/%]."""
+        return float(self.spans.ratio)
 
     def role(self, role: Role, default: float) -> float:
         """Return the canonical value of the dial that sets `role`."""
@@ -48,14 +76,21 @@ class _Reader:
         """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
         if isinstance(given, str):
             return default if self.settings[given].off else self.value(given)
-        return default if given is None else given
+        return default if given is None else self.number(given)
 
 
 def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
+    own = own_units and settings.equation.signals == "engineering"
+    interval = default_scan(settings.equation) if scan is None else scan
+    return algorithm_as_read(Reader(settings, replace(Spans() if own else settings.spans, scan=interval), own), interval)
+
+
+def algorithm_as_read(read: Reader, scan: float | None = None) -> Algorithm:
+    """Return the algorithm with its numbers as a reader reads them: floats, or without rounding."""
+    settings = read.settings
     equation = settings.equation
     engineering = equation.signals == "engineering"
-    read = _Reader(settings, Spans() if own_units and engineering else settings.spans)
     form = equation.form
     gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
     scale = read.role(Role.MULTIPLIER, 1.0)
@@ -63,7 +98,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     time = read.role(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
     if form is Form.PARALLEL:
         kp = gain * scale
-        scale *= float(read.spans.ratio) if engineering else 1.0
+        scale *= read.span_ratio if engineering else 1.0
         scale *= gain_sign(equation)
         ki, kd = rate * scale, time * scale
     else:
@@ -72,7 +107,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
     filt = equation.derivative.filter
     if filt is not None and equation.derivative.on == "none" and filt.applies_to in ("term", "lead-lag"):
         filt = None  # it filters what is not there
-    Tf, place, order = _filter(read, filt, rate, time)
+    Tf, place, order = _filter(read, filt, rate, time, kp, kd)
     if filt is not None and filt.applies_to == "lead-lag":
         kd -= kp * Tf
     if equation.derivative.rule is Rule.LAGGED_DIFFERENCE and not Tf:
@@ -95,7 +130,7 @@ def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | N
         derivative_rule=equation.derivative.rule,
         filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
         windup=equation.integral.windup.scheme,
-        gate=_gate(equation),
+        gate=_gate(read, equation),
         tracking_time=_tracking(read, rate, time, kp, ki, kd) if ki else 0.0,
         implicit_tracking=getattr(equation.integral.windup, "implicit", False),
         limits_without_integral=getattr(equation.integral.windup, "without_integral", "zero") == "limited",
@@ -126,19 +161,20 @@ def _some(value: float) -> float | None:
     return value if value else None
 
 
-def _weight(read: _Reader, on: str, weight: str | float | None) -> float:
+def _weight(read: Reader, on: str, weight: str | float | None) -> float:
     if on != "weighted":
         return float(on == "error")
-    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else weight
+    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else read.number(weight)
 
 
-def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tuple[float, Place, Any]:
+def _filter(read: Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
+    """Return the filter's time [s], place and order (specs/equations.md, section 1)."""
     if filt is None:
         return 0.0, "term", 1
     place: Place = "term" if filt.applies_to == "lead-lag" else filt.applies_to
     if filt.time is not None:
         return read.pick(filt.time, 0.0), place, filt.order
-    base = time / (1 + rate * time) if filt.of == "effective-derivative" else time
+    base = _filter_base(read, filt, rate, time, kp, kd)
     if base == 0:
         return 0.0, place, filt.order
     if isinstance(filt.gain, str) and read.settings[filt.gain].off:
@@ -153,7 +189,27 @@ def _filter(read: _Reader, filt: Filter | None, rate: float, time: float) -> tup
     return base * read.pick(filt.ratio, 0.0), place, filt.order
 
 
-def _gate(equation: Equation) -> Gate:
+def _filter_base(read: Reader, filt: Filter, rate: float, time: float, kp: float, kd: float) -> float:
+    """Return the derivative time that the filter's ratio or gain refers to [s].
+
+    Raises
+    ------
+    UndefinedError
+        It is ``kd/kp``, of a controller without proportional gain or with one of the other sign.
+    """
+    if filt.of == "effective-derivative":
+        return time / (1 + rate * time)
+    if filt.of == "derivative" or not kd or read.settings.equation.form is not Form.PARALLEL:
+        return time
+    if not kp or kd / kp <= 0:
+        raise UndefinedError(
+            f"{read.settings.card.id}: the derivative's filter goes with the derivative time kd/kp, and kp is {kp:g} with kd "
+            f"{kd:g}; give a proportional gain of the same sign, or switch the filter off"
+        )
+    return kd / kp
+
+
+def _gate(read: Reader, equation: Equation) -> Gate:
     match equation.integral.windup:
         case WindupGate() as w:
             return Gate(
@@ -163,16 +219,24 @@ def _gate(equation: Equation) -> Gate:
                 unless_smaller=w.direction == "unless-smaller",
                 from_integrated=w.resumes_from == "last-integrated",
                 by_output_sign=w.test == "error-times-output",
-                fast_return=w.fast_return,
+                drops=w.last_increment == "dropped",
             )
         case WindupRecompute() as w:
             return Gate(without_derivative=w.without_derivative, clamped=w.clamped)
-        case WindupExternalReset() as w:
-            return Gate(fast_return=w.fast_return)
+        case WindupExternalReset(fast_return=FastReturn() as f):
+            beyond = _level(read, f.low, -math.inf), _level(read, f.high, math.inf)
+            return Gate(fast_return=f.factor, fast_beyond=beyond) if beyond != (-math.inf, math.inf) else Gate()
     return Gate()
 
 
-def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
+def _level(read: Reader, given: str | float, default: float) -> float:
+    """Return a level of the output [%]: a level in engineering units counts from the low end of the range."""
+    level, low = read.pick(given, default), read.settings.op_range.low if read.settings.op_range is not None else 0.0
+    in_units = isinstance(given, str) and parse_unit(read.settings[given].unit).dimension is Dimension.PV_UNITS
+    return level - 100 * low / read.spans.op if in_units and read.settings.equation.signals == "percent" else level
+
+
+def _tracking(read: Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
     """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
     parallel = read.settings.equation.form is Form.PARALLEL
     integral_time = abs(kp / ki if parallel and kp else 1 / rate)
@@ -190,7 +254,7 @@ def _tracking(read: _Reader, rate: float, time: float, kp: float, ki: float, kd:
     return found * integral_time if windup.times == "Ti" else found
 
 
-def _integral_limits(read: _Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
+def _integral_limits(read: Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
     if limits is None:
         return None
 
@@ -221,7 +285,7 @@ def _transfer(equation: Equation) -> dict[str, Any]:
     }
 
 
-def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
+def _lag(read: Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
     """Return a signal's filter, or ``None`` where there is none or it is off."""
     filt = None if signal is None else signal.filter
     if filt is None:
@@ -232,10 +296,10 @@ def _lag(read: _Reader, signal: Setpoint | Measurement | ErrorShape | None, h: f
     factor = read.pick(filt.factor, 1.0)
     if not 0 < factor <= 1:
         raise SettingError(f"{read.settings.card.id}: {filt.factor} is {factor:g}; a share of the new sample is above 0, up to 1")
-    return Lag(h * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
+    return Lag(read.number(h) * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
 
 
-def _shape(read: _Reader, equation: Equation) -> Shape | None:
+def _shape(read: Reader, equation: Equation) -> Shape | None:
     """Return what is done to the error, or ``None`` where that is nothing; P on the measurement itself is no error."""
     error = equation.error
     if error is None or error.shape == "linear":
@@ -260,14 +324,17 @@ def _shape(read: _Reader, equation: Equation) -> Shape | None:
     )
 
 
-def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
+def _signals(read: Reader, equation: Equation, h: float) -> dict[str, Any]:
     sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
     cascade = None if equation.cascade is None else equation.cascade.proportional
     b = _weight(read, equation.proportional.on, equation.proportional.weight)
+    rate = math.inf if sp is None else read.pick(sp.rate, math.inf)
     other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
     return {
         "sp_filter": _lag(read, sp, h),
-        "sp_rate": math.inf if sp is None else read.pick(sp.rate, math.inf),
+        "sp_rate": rate,
+        "sp_rate_down": rate if sp is None or sp.rate_down is None else read.pick(sp.rate_down, math.inf),
+        "sp_rate_local": sp is not None and sp.rate_counts == "local",
         "sp_from_zero": sp is not None and sp.starts == "zero",
         "sp_tracks": sp is not None and sp.tracks,
         "pv_filter": _lag(read, pv, h),
@@ -280,11 +347,11 @@ def _signals(read: _Reader, equation: Equation, h: float) -> dict[str, Any]:
     }
 
 
-def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
+def _output(read: Reader, equation: Equation) -> dict[str, Any]:
     arithmetic = equation.arithmetic
     numbers: dict[str, Any] = {
         "output_rate": read.pick(equation.output.rate, math.inf),
-        "output_deadband": read.pick(equation.output.deadband, 0.0),
+        "output_deadband": read.level_of_output(equation.output.deadband),
         "resolution": read.pick(equation.output.resolution, 0.0),
     }
     if arithmetic is not None:
@@ -297,7 +364,7 @@ def _output(read: _Reader, equation: Equation) -> dict[str, Any]:
     return numbers
 
 
-def _dahlin(read: _Reader) -> Dahlin:
+def _dahlin(read: Reader) -> Dahlin:
     found = Dahlin(
         gain=read.role(Role.PROCESS_GAIN, 1.0),
         time=read.role(Role.PROCESS_TIME, 0.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -43,18 +44,18 @@ class Rational:
 
 
 def _rational(x: Rational | float) -> Rational:
-    return x if isinstance(x, Rational) else Rational((float(x),))
+    return x if isinstance(x, Rational) else Rational((x + 0.0,))  # no call of float(), which would round an exact number
 
 
-def add(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
-    """Return the sum of two polynomials, coefficients ascending."""
+def add(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the sum of two polynomials, coefficients ascending: floats, or exact numbers."""
     n = max(len(a), len(b))
     return tuple((a[i] if i < len(a) else 0.0) + (b[i] if i < len(b) else 0.0) for i in range(n))
 
 
-def multiply(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
-    """Return the product of two polynomials, coefficients ascending."""
-    out = [0.0] * (len(a) + len(b) - 1)
+def multiply(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the product of two polynomials, coefficients ascending: floats, or exact numbers."""
+    out: list[Any] = [0.0] * (len(a) + len(b) - 1)
     for i, x in enumerate(a):
         for j, y in enumerate(b):
             out[i + j] += x * y

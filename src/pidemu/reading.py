@@ -7,15 +7,18 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Final
 
+from pidemu.canonical import default_scan
 from pidemu.card.base import Form
 from pidemu.card.load import Card, Variant, match_name
-from pidemu.card.models import Setting
+from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.settings import RESERVED, Settings, Value, limits, off_values, spans_of
+from pidemu.ranges import RANGES, SignalRange, read_range
+from pidemu.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
+_OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
 _PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
 
 
@@ -23,7 +26,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     """Read settings and options; see `Card.settings`."""
     given = dict(given)
     _refuse_twice(card, given)
-    pv_range, op_range = (signal_range(card, name, given.pop(name, None)) for name in RESERVED)
+    pv_range, op_range = (signal_range(card, name, given.pop(name, None)) for name in RANGES)
     options = {k: v for k, v in given.items() if match_name(k, card.data.options)}
     dials = {k: v for k, v in given.items() if k not in options}
     notes: list[str] = []
@@ -31,7 +34,10 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     variant = card.variant(implied)
     folded = {name.casefold() for name in implied}
     defaulted = tuple(name for name in card.options if name.casefold() not in folded)
-    spans = spans_of(pv_range, op_range)
+    op_range = op_range or _output_range(variant.equation)
+    in_scans = any(parse_unit(s.unit).scans for s in variant.equation.settings.values())
+    scan = default_scan(variant.equation) if in_scans else None
+    spans = spans_of(pv_range, op_range, scan)
     values: dict[str, Value] = {}
     faults: list[str] = []
     names = {match_name(k, variant.equation.settings) or k: v for k, v in dials.items()}
@@ -54,7 +60,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
                 notes.append(f"{name} is not used with {variant.choice_text}")
     if faults:
         raise SettingError("\n".join(faults))
-    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted)
+    return Settings(variant, values, pv_range, op_range, tuple(notes), defaulted, scan=scan)
 
 
 def _refuse_twice(card: Card, given: Mapping[str, object]) -> None:
@@ -92,19 +98,19 @@ def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, obje
     return chosen
 
 
-def signal_range(card: Card, name: str, given: object) -> tuple[float, float] | None:
-    """Return a signal range [engineering units]; raises `SettingError` where it is none."""
-    if given is None:
-        return None
+def signal_range(card: Card, name: str, given: object) -> SignalRange | None:
+    """Return a signal range that is given for a card, if it is; raises `SettingError` where it is not a range."""
     try:
-        if isinstance(given, str):
-            raise ValueError
-        low, high = (float(x) for x in given)  # type: ignore[attr-defined]
-    except (TypeError, ValueError, OverflowError):
-        raise SettingError(f"{card.id}: {name}: '{given}' is not a pair of numbers such as (0, 200)") from None
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise SettingError(f"{card.id}: {name}: {low:g} to {high:g} is no range; give low, then high")
-    return low, high
+        return None if given is None else read_range(given)
+    except SettingError as error:
+        raise SettingError(f"{card.id}: {name}: {error}") from None
+
+
+def _output_range(equation: Equation) -> SignalRange | None:
+    """Return the output's range where it is the card's: a band, or a gain in % of output, moves it over just that."""
+    units = [parse_unit(s.unit).dimension for s in equation.settings.values() if s.sets == "gain"]
+    known = equation.signals == "engineering" and all(map(math.isfinite, equation.output.limits))
+    return SignalRange(*equation.output.limits) if known and units and units[0] in _OF_WHOLE_OUTPUT else None
 
 
 def _read(
@@ -161,6 +167,11 @@ def _number(
             f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
             f"write {number:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
         )
+    if written.scans != unit.scans:
+        raise SettingError(
+            f"'{given}' {'counts in scans' if written.scans else 'does not count in scans'}, this dial is in {unit.name}; "
+            f"what that is depends on the scan interval: work it out and write it in {unit.name}"
+        )
     _need_ranges(written, unit, ranged)
     value = convert_unit(role, number, written, unit, spans)
     inverted = is_reciprocal(role, written) != is_reciprocal(role, unit)
@@ -172,7 +183,9 @@ def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:
     """Refuse a unit whose conversion takes the signal ranges, where these are not given."""
     needs = {Dimension.PV_UNITS: (True, False), Dimension.PERCENT_PER_PV: (True, False), Dimension.OP_PER_PV: (True, True)}
     pv, op = needs.get(written.dimension, needs.get(unit.dimension, (False, False)))
-    missing = [name for name, needed, given in zip(RESERVED, (pv, op), ranged, strict=True) if needed and not given]
+    if written.degree is not None and unit.degree is not None:
+        pv = op = False  # two kinds of degree
+    missing = [name for name, needed, given in zip(RANGES, (pv, op), ranged, strict=True) if needed and not given]
     if missing:
         raise SettingError(
             f"{written.name} is {written.dimension.value}, for a dial in {unit.name}: {' and '.join(missing)} must be given"
@@ -193,6 +206,8 @@ def _check(value: Value, written: object) -> None:
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
-        raise SettingError(f"{shown} is infinite, and infinity is no off value here")
+        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
-        raise SettingError(f"{shown} would be infinite action; the smallest value above zero is meant, or another unit")
+        off = off_values(setting)
+        instead = f"{off[0]:g} switches it off" if off else "give the smallest value above zero, or another unit"
+        raise SettingError(f"{shown} would be infinite action; {instead}")

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, Lag
 from pidemu.card.load import Card, Statement, Variant
 from pidemu.card.models import Equation, Setting
-from pidemu.units import FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
+from pidemu.ranges import PERCENT, SignalRange
+from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
     from pidemu.law import Law
-
-RESERVED: Final = ("pv_range", "op_range")
-"""Names that no setting may have: they state the signal ranges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class Value:
     unit : str
         The card's unit.
     spans : Spans
-        Signal spans, for gains in engineering units.
+        Signal spans and, where dials of the card count in scans, the scan interval.
     given : bool
         Whether the user gave it; otherwise it is the card's default.
     active : bool
@@ -116,8 +114,8 @@ class Settings(Mapping[str, Value]):
         The card with its options chosen.
     values_by_name : dict
         Value by dial.
-    pv_range, op_range : tuple of float or None
-        Signal ranges [engineering units], where given.
+    pv_range, op_range : SignalRange or None
+        Ranges of measurement and output, where given.
     notes : tuple of str
         What was inferred or converted on the way in.
     defaulted : tuple of str
@@ -125,15 +123,22 @@ class Settings(Mapping[str, Value]):
     pace : float
         Interval at which the algorithm is really executed per the interval it computes with. All its times are this much longer:
         integral and derivative time, filters, ramps; the gain stays (specs/equations.md, section 3).
+    lag : float
+        A first-order lag on the measurement in front of the block, which is not a dial of it [s]: what a conversion asks for where
+        the source filters its measurement and the target cannot. 0 where there is none.
+    scan : float or None
+        Scan interval at which dials that count in scans are read [s], the card's unless stated; ``None`` where it has none.
     """
 
     variant: Variant
     values_by_name: Mapping[str, Value]
-    pv_range: tuple[float, float] | None = None
-    op_range: tuple[float, float] | None = None
+    pv_range: SignalRange | None = None
+    op_range: SignalRange | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
     pace: float = 1.0
+    lag: float = 0.0
+    scan: float | None = field(default=None, compare=False)
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
@@ -176,7 +181,26 @@ class Settings(Mapping[str, Value]):
     @property
     def spans(self) -> Spans:
         """Signal spans; 100 where no range was given."""
-        return spans_of(self.pv_range, self.op_range)
+        return spans_of(self.pv_range, self.op_range, self.scan)
+
+    @property
+    def counts_scans(self) -> bool:
+        """Whether a dial at work counts in scans, so that the algorithm's numbers depend on the scan interval."""
+        return any(parse_unit(v.unit).scans and v.active and not v.off for v in self.values())
+
+    def at_scan(self, scan: float | None) -> Settings:
+        """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none."""
+        if scan is None or self.scan is None:
+            return self
+        values = {name: replace(v, spans=replace(v.spans, scan=scan)) for name, v in self.items()}
+        return replace(self, values_by_name=values, scan=scan)
+
+    @property
+    def own_ranges(self) -> tuple[SignalRange, SignalRange]:
+        """Ranges of measurement and output in the units that the card computes in: percent, or the ranges given, else 0 to 100."""
+        if self.equation.signals == "percent":
+            return PERCENT, PERCENT
+        return self.pv_range or PERCENT, self.op_range or PERCENT
 
     def by_role(self, role: Role) -> Value | None:
         """Return the active dial that sets `role`, or ``None``."""
@@ -185,7 +209,7 @@ class Settings(Mapping[str, Value]):
     def assumptions(self) -> list[Statement]:
         """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose.
 
-        What is assumed of the derivative does not count where it is off.
+        What is assumed of the derivative, or of a filter on a signal, does not count where it is off.
         """
         return self._at_work(self.variant.assumptions(self.defaulted))
 
@@ -199,7 +223,10 @@ class Settings(Mapping[str, Value]):
 
     def _at_work(self, found: list[Statement]) -> list[Statement]:
         a = self.algorithm()
-        return [s for s in found if a.kd or a.Tf or not s.path.startswith("derivative")]
+        off: tuple[str, ...] = () if a.kd or a.Tf else ("derivative",)
+        off += () if a.sp_filter else ("setpoint.filter",)
+        off += () if a.pv_filter else ("measurement.filter",)
+        return [s for s in found if not s.path.startswith(off)] if off else found
 
     def changed(self, values: Mapping[str, object]) -> Settings:
         """Return these settings with some changed, by name; options as well.
@@ -216,7 +243,7 @@ class Settings(Mapping[str, Value]):
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
-        return self.card.settings({**given, **values})
+        return self.card.settings({**given, **values}).at_scan(self.scan)
 
     def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.
@@ -227,7 +254,8 @@ class Settings(Mapping[str, Value]):
             For a card that computes in engineering units: leave the gains in those units, as the scan program needs them,
             instead of percent of span.
         scan : float, optional
-            Scan interval, for filters that are set as a share per scan [s]; by default the card's.
+            Scan interval, for dials that count in scans and filters that are set as a share per scan [s]; by default that of
+            the settings, or the card's.
 
         Raises
         ------
@@ -238,17 +266,23 @@ class Settings(Mapping[str, Value]):
 
         equation = self.equation
         filtered = (equation.setpoint, equation.measurement, equation.error) != (None, None, None)
-        key = (own_units and equation.signals == "engineering", scan if filtered else None)  # what makes a difference
+        real, scan = scan, self.scan if scan is None else scan
+        timed = filtered or self.counts_scans
+        key = (own_units and equation.signals == "engineering", scan if timed else None)  # what makes a difference
         if key not in self._algorithms:
-            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=scan).paced(self.pace)
+            declared = self.scan if real is None else real / self.pace
+            found = algorithm_of(self, own_units=own_units, scan=declared).paced(self.pace)
+            self._algorithms[key] = replace(found, pv_filter=Lag(self.lag)) if self.lag and found.pv_filter is None else found
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return card, active settings and options as plain values, for JSON."""
+        """Return card, active settings, options and the ranges given as plain values, for JSON."""
+        ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         return {
             "card": self.card.id,
             "settings": {n: {"value": v.value, "unit": v.unit} for n, v in self.items() if v.active},
             "options": dict(self.options),
+            **{name: given.to_dict() for name, given in ranges if given is not None},
         }
 
     def without_use_for(self, signals: Iterable[str]) -> dict[str, str]:
@@ -274,6 +308,6 @@ class Settings(Mapping[str, Value]):
         return Law(self.algorithm(scan=scan), scan)
 
 
-def spans_of(pv: tuple[float, float] | None, op: tuple[float, float] | None) -> Spans:
-    """Return the spans of signal ranges; 100 where none is given."""
-    return Spans(pv[1] - pv[0] if pv else 100.0, op[1] - op[0] if op else 100.0)
+def spans_of(pv: SignalRange | None, op: SignalRange | None, scan: float | None = None) -> Spans:
+    """Return the spans of signal ranges, 100 where none is given, with the scan interval [s] and the size of a degree."""
+    return Spans((pv or PERCENT).span, (op or PERCENT).span, scan, DEGREES.get(pv.unit) if pv is not None else None)

@@ -17,16 +17,20 @@ all others          the plain ratio                         1
 Unit conversion is exact rational arithmetic, rounded once, so that 4 repeats per minute are 15 s per repeat and not
 15.000000000000002. A card that computes in engineering units has its levels and rates in those. Infinity is a value of the
 integral time (no integral action); zero is its reset rate.
+
+A dial may count in scans (``%/scan``, ``scan``): what that is per second depends on the scan interval. Engineering units of the
+measurement may be degrees (``degC``, ``K``, ``degF``): differences of temperature, of which 9 degF are 5 degC.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
-from typing import Final
+from functools import cache
+from typing import Any, Final
 
 from pidemu.errors import UnitError, suggest
 
@@ -63,6 +67,7 @@ class Role(StrEnum):
     TRACKING_TIME = "tracking-time"
     FILTER_FACTOR = "filter-factor"
     INTEGRAL_LIMIT = "integral-limit"
+    WINDUP_LIMIT = "windup-limit"
     DEADBAND = "deadband"
     GAP_GAIN = "gap-gain"
     LINEARITY = "linearity"
@@ -77,11 +82,12 @@ class Role(StrEnum):
     CLOSED_LOOP_TIME = "closed-loop-time"
 
 
-LEVELS: Final = (Role.INTEGRAL_LIMIT, Role.DEADBAND, Role.BIAS, Role.RESOLUTION)
+LEVELS: Final = (Role.INTEGRAL_LIMIT, Role.WINDUP_LIMIT, Role.DEADBAND, Role.BIAS, Role.RESOLUTION)
 """Roles whose canonical value is a signal's [%]."""
 RATES: Final = (Role.OUTPUT_RATE, Role.SETPOINT_RATE)
 """Roles whose canonical value is a signal's rate of change [%/s]."""
-_OF_MEASUREMENT: Final = (Role.DEADBAND, Role.SETPOINT_RATE)
+OF_MEASUREMENT: Final = (Role.DEADBAND, Role.SETPOINT_RATE)
+"""Levels and rates of the measurement; the others are the output's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,39 +101,71 @@ class Unit:
     dimension : Dimension
         What it measures.
     factor : Fraction
-        One of this unit in seconds, 1/s or plain ratio.
+        One of this unit in seconds, 1/s or plain ratio; where it counts in scans, at an interval of 1 s.
+    scans : {-1, 0, 1}
+        Power of the scan interval in it: 1 for a time in scans, -1 for what is per scan.
+    degree : Fraction or None
+        Size of its degree [K], where it measures a difference of temperature.
     """
 
     name: str
     dimension: Dimension
     factor: Fraction = Fraction(1)
+    scans: int = 0
+    degree: Fraction | None = None
+
+    @property
+    def meaning(self) -> str:
+        """What it measures, in words."""
+        if self.degree is None:
+            return self.dimension.value
+        return {
+            Dimension.PV_UNITS: "a difference of temperature",
+            Dimension.PERCENT_PER_PV: "percent of output per degree",
+        }.get(self.dimension, "degrees per time")
 
 
 @dataclass(frozen=True, slots=True)
 class Spans:
-    """Widths of the signal ranges, in engineering units.
+    """What a dial's unit may refer to: the widths of the signal ranges and the scan interval.
 
     Attributes
     ----------
     pv, op : float
-        Span of the measurement and of the output.
+        Span of the measurement and of the output [engineering units].
+    scan : float or None
+        Scan interval [s], where a dial counts in scans.
+    degree : Fraction or None
+        Size of the measurement's unit [K], where that is a known degree; otherwise a dial in degrees is taken to be in the
+        measurement's own unit.
     """
 
     pv: float = 100.0
     op: float = 100.0
+    scan: float | None = None
+    degree: Fraction | None = None
 
     @property
     def ratio(self) -> Fraction:
         """Percent gain that one output unit per measurement unit amounts to [%/%]."""
         return Fraction(self.pv) / Fraction(self.op)
 
+    def pv_in(self, unit: Unit) -> Fraction:
+        """Span of the measurement, in the engineering unit that a dial's unit refers to."""
+        degrees = 1 if self.degree is None or unit.degree is None else self.degree / unit.degree
+        return Fraction(self.pv) * degrees
+
 
 FULL: Final = Spans()
 """Spans of 100: percent."""
 
 
+DEGREES: Final = {"degC": Fraction(1), "K": Fraction(1), "degF": Fraction(5, 9)}
+"""Size of a degree [K]."""
+
+
 def _table() -> dict[str, Unit]:
-    seconds = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
+    seconds = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600), "scan": Fraction(1)}
     units = [
         Unit("1", Dimension.RATIO),
         Unit("%/%", Dimension.RATIO),
@@ -137,14 +175,21 @@ def _table() -> dict[str, Unit]:
         Unit("%/eu", Dimension.PERCENT_PER_PV),
         Unit("Hz", Dimension.FREQUENCY, Fraction(2 * math.pi)),
     ]
-    for name, size in seconds.items():
+    for name, size in DEGREES.items():
         units += [
-            Unit(name, Dimension.TIME, size),
-            Unit(f"{name}/repeat", Dimension.TIME_PER_REPEAT, size),
-            Unit(f"repeat/{name}", Dimension.REPEATS_PER_TIME, 1 / size),
-            Unit(f"1/{name}", Dimension.PER_TIME, 1 / size),
-            Unit(f"%/{name}", Dimension.PERCENT_PER_TIME, 1 / size),
-            Unit(f"eu/{name}", Dimension.UNITS_PER_TIME, 1 / size),
+            Unit(name, Dimension.PV_UNITS, degree=size),
+            Unit(f"%/{name}", Dimension.PERCENT_PER_PV, degree=size),
+        ]
+    for name, size in seconds.items():
+        up, down = (1, -1) if name == "scan" else (0, 0)
+        units += [
+            Unit(name, Dimension.TIME, size, up),
+            Unit(f"{name}/repeat", Dimension.TIME_PER_REPEAT, size, up),
+            Unit(f"repeat/{name}", Dimension.REPEATS_PER_TIME, 1 / size, down),
+            Unit(f"1/{name}", Dimension.PER_TIME, 1 / size, down),
+            Unit(f"%/{name}", Dimension.PERCENT_PER_TIME, 1 / size, down),
+            Unit(f"eu/{name}", Dimension.UNITS_PER_TIME, 1 / size, down),
+            *(Unit(f"{word}/{name}", Dimension.UNITS_PER_TIME, 1 / size, down, degree) for word, degree in DEGREES.items()),
         ]
     return {u.name: u for u in units}
 
@@ -155,7 +200,8 @@ UNITS: Final = _table()
 _WORDS: Final = {
     "ms": "ms", "msec": "ms", "millisecond": "ms", "s": "s", "sec": "s", "second": "s", "min": "min", "minute": "min",
     "mn": "min", "h": "h", "hr": "h", "hour": "h", "repeat": "repeat", "rep": "repeat", "rpt": "repeat", "": "1",
-    "1": "1", "%": "%", "percent": "%", "eu": "eu", "hz": "Hz",
+    "1": "1", "%": "%", "percent": "%", "eu": "eu", "hz": "Hz", "scan": "scan", "sample": "scan", "k": "K", "kelvin": "K",
+    "degc": "degC", "°c": "degC", "celsius": "degC", "degf": "degF", "°f": "degF", "fahrenheit": "degF",
 }  # fmt: skip
 _WHOLE: Final = {"rpm": "repeat/min", "psi/in": "eu/eu", "psi/inch": "eu/eu"}
 _NUMBER: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|inf(?:inity)?|nan))\s*(.*?)\s*$", re.I)
@@ -179,6 +225,7 @@ _PLAIN: Final = (Dimension.RATIO, Dimension.PERCENT)
 _INVERTED: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 
 
+@cache
 def parse_unit(text: str) -> Unit:
     """Return the unit a person wrote: ``"rep/min"``, ``"minutes per repeat"``, ``"sec"``, ``"%"``.
 
@@ -194,7 +241,11 @@ def parse_unit(text: str) -> Unit:
         whole = "/".join(p or "?" for p in parts)
     unit = UNITS.get(whole)
     if unit is None:
-        raise UnitError(f"unknown unit '{text.strip()}'{suggest(spelled, UNITS)}; known units: {', '.join(UNITS)}")
+        known = [u.name for u in UNITS.values() if u.degree is None and not u.scans]
+        raise UnitError(
+            f"unknown unit '{text.strip()}'{suggest(spelled, UNITS)}; known units: {', '.join(known)}; "
+            f"also scan in place of a time, and {', '.join(DEGREES)} in place of eu"
+        )
     return unit
 
 
@@ -222,19 +273,29 @@ def _constant(role: Role, unit: Unit, spans: Spans) -> Fraction:
             case Dimension.PERCENT:
                 return Fraction(100)
             case Dimension.PV_UNITS:
-                return Fraction(spans.pv)
+                return spans.pv_in(unit)
             case Dimension.OP_PER_PV:
                 return spans.ratio
             case Dimension.PERCENT_PER_PV:
-                return Fraction(spans.pv) / 100
+                return spans.pv_in(unit) / 100
             case _:
                 return Fraction(1)
+    factor = _in_seconds(unit, spans)
     if role in LEVELS or role in RATES:
-        per_time = unit.factor if role in RATES else 1
-        span = spans.pv if role in _OF_MEASUREMENT else spans.op
+        per_time = factor if role in RATES else Fraction(1)
+        span = spans.pv_in(unit) if role in OF_MEASUREMENT else Fraction(spans.op)
         in_units = unit.dimension in (Dimension.PV_UNITS, Dimension.UNITS_PER_TIME)
-        return Fraction(100) / Fraction(span) * per_time if in_units else Fraction(per_time)
-    return 1 / unit.factor if is_reciprocal(role, unit) else unit.factor
+        return 100 / span * per_time if in_units else per_time
+    return 1 / factor if is_reciprocal(role, unit) else factor
+
+
+def _in_seconds(unit: Unit, spans: Spans) -> Fraction:
+    """Return a unit's factor at the scan interval."""
+    if not unit.scans:
+        return unit.factor
+    if spans.scan is None:
+        raise UnitError(f"'{unit.name}' counts in scans, and the scan interval is not known; write it per second, or in seconds")
+    return unit.factor * Fraction(spans.scan) ** unit.scans
 
 
 def _inward(role: Role, x: Fraction, unit: Unit, spans: Spans) -> Fraction:
@@ -265,12 +326,17 @@ def check_unit(role: Role, unit: Unit) -> None:
         The unit's dimension does not fit the role.
     """
     accepted = _ACCEPTED.get(role, _PLAIN)
+    purpose = role.value.replace("-", " ")
     if unit.dimension not in accepted:
-        names = [u.name for u in UNITS.values() if u.dimension in accepted and not u.name.startswith(("ms", "h"))]
+        usual = [u for u in UNITS.values() if u.dimension in accepted and not u.degree and not u.scans]
+        names = [u.name for u in usual if not u.name.startswith(("ms", "h"))]
         raise UnitError(
-            f"'{unit.name}' is {unit.dimension.value} and cannot set {role.value.replace('-', ' ')}; "
+            f"'{unit.name}' is {unit.meaning} and cannot set {purpose}; "
             f"use one of: {', '.join(n for n in names if '/ms' not in n and not n.endswith('/h'))}"
         )
+    if unit.degree is not None and role not in (Role.GAIN, *OF_MEASUREMENT):
+        other = unit.name.replace(unit.name.split("/")[0], "eu", 1)
+        raise UnitError(f"'{unit.name}' is {unit.meaning}, and the {purpose} belongs to the output; use '{other}'")
 
 
 def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) -> float:
@@ -285,7 +351,7 @@ def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) -> f
     unit : Unit
         The dial's unit.
     spans : Spans
-        Spans of measurement and output [engineering units], used by gains in engineering units only.
+        Spans of measurement and output, for units that refer to them, and the scan interval, for units that count in scans.
 
     Returns
     -------
@@ -295,7 +361,7 @@ def to_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) -> f
     Raises
     ------
     UnitError
-        The unit does not fit the role, or the value is not a number.
+        The unit does not fit the role, the value is not a number, or it counts in scans of unknown length.
 
     Examples
     --------
@@ -318,6 +384,17 @@ def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) ->
     inf
     """
     return _convert(role, value, unit, spans, inward=False)
+
+
+def to_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> Any:
+    """Return the canonical value of a finite dial without rounding, for a fraction or a `pidemu.exact_numbers.Exact`."""
+    check_unit(role, unit)
+    return _inward(role, value, unit, spans)
+
+
+def from_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> Any:
+    """Return the dial value of a canonical one without rounding; the inverse of `to_canonical_exactly`."""
+    return _outward(role, value, unit, spans)
 
 
 def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
@@ -343,7 +420,11 @@ def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = 
     --------
     >>> convert_unit(Role.INTEGRAL, 4, UNITS["repeat/min"], UNITS["s/repeat"])
     15.0
+    >>> convert_unit(Role.DEADBAND, 9, UNITS["degF"], UNITS["degC"])
+    5.0
     """
+    if spans.degree is None:  # two kinds of degree: the span is in one of them
+        spans = replace(spans, degree=old.degree or new.degree)
     if not math.isfinite(value) or (value == 0 and is_reciprocal(role, old)):
         return from_canonical(role, to_canonical(role, value, old, spans), new, spans)
     check_unit(role, old)

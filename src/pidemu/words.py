@@ -6,19 +6,19 @@ from collections.abc import Iterable
 from typing import Any
 
 from pidemu.errors import SettingError, UnitError
-from pidemu.settings import RESERVED
+from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
 
 def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, Any]:
     """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
 
-    A signal range, such as ``pv_range=0,200``, is a pair of numbers; every other value stays a text.
+    A signal range, such as ``pv_range=0,400 degC``, is read; every other value stays a text.
 
     Raises
     ------
     SettingError
-        A word has no ``=``, a name comes twice, or a signal range is no pair.
+        A word has no ``=``, a name comes twice, or a signal range is not one.
     """
     found: dict[str, Any] = {}
     for word in words:
@@ -30,7 +30,7 @@ def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAI
         if first is not None:
             raise SettingError(f"{name} is given twice, {found[first]} and {value.strip()}; give it once")
         found[name] = value.strip()
-    return {name: pair(value) if name in RESERVED else value for name, value in found.items()}
+    return {name: read_range(value) if name in RANGES else value for name, value in found.items()}
 
 
 def pair(text: str) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from pidemu.ambiguity.readings import apart, command_line
 from pidemu.card.library import card_files
 from pidemu.cli.common import assignments
 from pidemu.errors import CardNotFoundError, SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 from tests.checks.bench import VALID
 
@@ -231,8 +232,9 @@ def test_a_recursion_without_pid_settings_has_no_readings() -> None:
 def own_cards(tmp_path: Path) -> Path:
     """Two cards of one vendor, with times in seconds and in minutes."""
     (tmp_path / "acme").mkdir()
-    (tmp_path / "acme" / "seconds.yaml").write_text(VALID, encoding="utf-8")
-    minutes = VALID.replace("sets: integral, unit: s", "sets: integral, unit: min")
+    seconds = VALID.replace("vendor: Nobody", "vendor: Acme").replace("RESET: 60, RATE: 16", "RESET: 60 s, RATE: 16 s")
+    (tmp_path / "acme" / "seconds.yaml").write_text(seconds, encoding="utf-8")
+    minutes = seconds.replace("sets: integral, unit: s", "sets: integral, unit: min")
     minutes = minutes.replace("sets: derivative, unit: s", "sets: derivative, unit: min")
     (tmp_path / "acme" / "minutes.yaml").write_text(minutes, encoding="utf-8")
     return tmp_path
@@ -254,7 +256,7 @@ def test_commands_for_cards_of_one_s_own_name_their_folder_or_file(own_cards: Pa
 
 def test_ranges_are_kept_and_stated() -> None:
     first, *_ = pidemu.readings("arduino/pid", Kp=2, Ki=0.1, pv_range=(-50, 150), op_range=(0, 255))
-    assert first.settings.pv_range == (-50, 150)
+    assert first.settings.pv_range == SignalRange(-50, 150)
     assert first.command == 'arduino/pid Kp=2 "Ki=0.1 1/s" --pv-range=-50,150 --op-range=0,255'
 
 

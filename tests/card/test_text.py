@@ -156,9 +156,11 @@ def _is_the_law(card: Card) -> None:
 def test_the_structure_in_cascade_has_a_line_of_its_own() -> None:
     lines = equation_lines(pidemu.load_card("yokogawa/fieldbus-pid").variant())
     assert lines[:2] == [
-        "OUT = K [ (-PVf) + 1/(Ti s) (SP - PVf) + Td s (-PVf) ]",
-        "OUT = K [ (SP - PVf) + 1/(Ti s) (SP - PVf) + Td s (-PVf) ]   in cascade, with a remote SP",
+        "OUT = K [ (-PVf) + 1/(Ti s) (SPf - PVf) + Td s (-PVf) ]",
+        "OUT = K [ (SPf - PVf) + 1/(Ti s) (SPf - PVf) + Td s (-PVf) ]   in cascade, with a remote SP",
     ]
+    rates = "at most SP_RATE_UP [eu/scan] upwards, SP_RATE_DN [eu/scan] downwards; a remote setpoint is not limited"
+    assert f"SPf = SP, changing by {rates}" in lines
 
 
 def test_pole_cancellation_is_written_as_its_discrete_law() -> None:

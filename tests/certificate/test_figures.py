@@ -15,11 +15,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.certificate.figures import decibels, degrees, percent
+from pidemu.certificate.linear import certify, differences, time_scale
 from pidemu.certificate.models import Kick, PathComparison
 from pidemu.cli import cli
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 from tests.conversion.support import Floats, continuous, difference, settings_that_act
+from tests.helpers import made_up_card
 
 PROVOX = {"GAIN": 2, "RESET": 4, "RATE": 0.1}
 TERM_FILTERS = (
@@ -226,11 +229,14 @@ def test_the_kick_is_the_first_move_of_the_emulated_controller() -> None:
 class TestRescaling:
     """New signal ranges: the same effect in engineering units."""
 
-    RANGES: ClassVar = {"pv": ((0.0, 100.0), (50.0, 250.0)), "op": ((0.0, 80.0), (0.0, 100.0))}
+    RANGES: ClassVar = {
+        "pv": ((0.0, 100.0, "degC"), (50.0, 250.0, "degC")),
+        "op": ((0.0, 80.0, "kg/h"), (0.0, 100.0, "kg/h")),
+    }
 
     def convert(self, target: str, **options: str) -> pidemu.Conversion:
         source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=self.RANGES["pv"][0], op_range=self.RANGES["op"][0])
-        return pidemu.convert(source, target, options=options, pv_range=self.RANGES["pv"][1], op_range=self.RANGES["op"][1])
+        return pidemu.convert(source, target, options=options, to_pv_range=self.RANGES["pv"][1], to_op_range=self.RANGES["op"][1])
 
     def test_the_factor_is_that_of_the_spans(self) -> None:
         assert self.convert("emerson/deltav").factor == pytest.approx(200 / 100 * 80 / 100)
@@ -260,20 +266,23 @@ class TestRescaling:
         for s in (conversion.source, conversion.settings):
             assert s.pv_range is not None
             assert s.op_range is not None
-            zero, span = s.pv_range[0], s.pv_range[1] - s.pv_range[0]
-            start = 100 * (40 - s.op_range[0]) / (s.op_range[1] - s.op_range[0])
+            zero, span = s.pv_range.low, s.pv_range.span
+            start = 100 * (40 - s.op_range.low) / s.op_range.span
             controller = pidemu.Controller(s, 1.0, output_limits=(-1e9, 1e9), initial_output=start)
             percent = controller.run(100 * (sp - zero) / span, 100 * (pv - zero) / span)
-            valves.append(s.op_range[0] + percent / 100 * (s.op_range[1] - s.op_range[0]))
+            valves.append(s.op_range.low + percent / 100 * s.op_range.span)
         assert np.ptp(valves[0]) > 1
         assert difference(valves[0], valves[1]) < 1e-9  # 152 scans of doubles
 
     def test_a_warning_says_so(self) -> None:
-        assert any("multiplied by 1.6 for the same effect" in w for w in self.convert("generic/parallel").warnings)
+        assert self.convert("generic/parallel").warnings[:2] == (
+            "PV range: 0 to 100 degC becomes 50 to 250 degC, so the gain in percent is multiplied by 2",
+            "output range: 0 to 80 kg/h becomes 0 to 100 kg/h, so the gain in percent is multiplied by 0.8",
+        )
 
     def test_the_same_ranges_change_nothing(self) -> None:
-        source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=(0, 300))
-        conversion = pidemu.convert(source, "generic/parallel", pv_range=(100, 400))
+        source = pidemu.load_card("fisher/provox").settings(**PROVOX, pv_range=(0, 300, "K"))
+        conversion = pidemu.convert(source, "generic/parallel", to_pv_range=(100, 400, "K"))
         assert conversion.factor == 1
         assert conversion.settings["kp"].value == pytest.approx(2.7)
 
@@ -346,7 +355,7 @@ def test_the_json_answer_has_the_shape_that_stays() -> None:
     assert isinstance(source, dict)
     assert isinstance(certificate, dict)
     assert goal["card"] == "emerson/deltav"
-    assert goal["options"] == {"FORM": "Standard", "STRUCTURE": "7"}
+    assert goal["options"] == {"FORM": "Standard", "STRUCTURE": "7", "FRSIPID_OPTS": "none"}
     assert answer["chosen"] == {"STRUCTURE": "7"}
     assert goal["settings"]["RESET"] == {"value": pytest.approx(20.25), "unit": "s/repeat"}
     assert source["settings"]["RESET"] == {"value": 4.0, "unit": "repeat/min"}
@@ -396,3 +405,39 @@ def test_what_is_assumed_is_listed() -> None:
     conversion = convert("fisher/provox", PROVOX, "emerson/deltav")
     assert any("fisher/provox: derivative.filter.ratio = 0.125" in a for a in conversion.assumptions)
     assert convert("generic/standard", {"K": 2, "Ti": 60}, "generic/parallel").assumptions == ()
+
+
+class TestNoResponse:
+    """Where one path has no response there is nothing to compare, and no figure of 1e16 stands for it."""
+
+    def test_a_filter_without_derivative_does_not_move_the_end_of_the_full_band(self) -> None:
+        """K Tf/Ti (1 - 1) leaves m2 = 6e-14: no derivative time, at 100 times whose reciprocal the two would differ 1e16 times."""
+        source = pidemu.load_card("generic/standard").settings(K=17, Ti=15, Tf=21, b=0)
+        assert source.law().moments()[2] != 0
+        c = pidemu.convert(source, "generic/standard", match="textbook", emulate=False).certificate
+        assert c.setpoint.full_band.high == pytest.approx(100 / 15)
+        assert c.setpoint.full_band.max_deviation == pytest.approx(100, rel=1e-9)  # K (1 + 1/(s Ti)) per K/(s Ti), less 1: s Ti
+        assert time_scale(source.law()) == pytest.approx(15)
+
+    def test_a_setpoint_path_that_is_zero_is_not_comparable(self) -> None:
+        card = pidemu.load_card("generic/standard")
+        on_pv, on_error = card.settings(K=2, Ti="off", b=0), card.settings(K=2, Ti="off")
+        band = certify(on_pv.law(), on_error.law(), None).setpoint.loop_band
+        assert (band.max_deviation, band.gain_db, band.phase_deg) == (math.inf, math.inf, math.inf)
+        assert [percent(band.max_deviation), decibels(band), degrees(band)] == ["not comparable", "-", "-"]
+        lost = certify(on_error.law(), on_pv.law(), None).setpoint.loop_band
+        assert [percent(lost.max_deviation), decibels(lost), degrees(lost)] == ["100 %", "-", "-"]
+        none = certify(on_pv.law(), on_pv.law(), None).setpoint.loop_band
+        assert (none.max_deviation, none.gain_db, none.phase_deg) == (0, 0, 0)
+        plain = certify(on_pv.law(), on_error.law(), None).to_dict()
+        assert plain["setpoint"]["loop_band"]["max_deviation"] == "inf"
+
+    def test_a_response_that_is_only_rounding_is_none(self) -> None:
+        """A trapezoidal integral has no response at half the scan rate: there 1 + z^-1 is rounding."""
+        text = {"rule": "trapezoidal", "windup": {"scheme": "none"}}
+        source = made_up_card(integral=text).settings(kp=0, ki=0.1, kd=0)
+        target = pidemu.load_card("generic/parallel").settings(kp=0, ki=0.1)
+        w = np.array([0.1, math.pi])
+        deviation, gain, _ = differences(source.law(1.0).held(w), target.law(1.0).held(w))
+        assert deviation[0] < 0.1
+        assert (deviation[1], gain[1]) == (math.inf, math.inf)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,14 @@ import pytest
 
 import pidemu
 from pidemu.card.stages import STARTS
-from pidemu.certificate import nonlinear
+from pidemu.certificate import windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
-from pidemu.certificate.sides import Side
-from pidemu.certificate.trials import Plan, Trial, tried
-from pidemu.record.standard import scale_of
-from pidemu.scan.build import Action
+from pidemu.certificate.recovery import Recoveries, Recovery
+from pidemu.certificate.sides import sides
+from pidemu.certificate.trials import Bench, Plan
+from pidemu.record.sampling import limits_for
+from pidemu.record.standard import scale_of, standard_record
 from pidemu.settings import Settings
 from tests.checks.bench import VALID, edited, written
 from tests.conversion.test_options import CARDS, SOURCES
@@ -25,9 +27,10 @@ from tests.helpers import Floats
 
 STAYS = "at the limit after the error has turned [s]"
 AT_ZERO = "output with the error back at zero [% of output span]"
+WITH_NOISE = "output on the way back from a limit, with noise [% of output span]"
 TO_AUTO = "bump to automatic [% of output span]"
 TO_MANUAL = "bump to manual [% of output span]"
-ASPECTS = ["windup", "transfer", "limits", "arithmetic", "error", "output", "setpoint"]
+ASPECTS = ["windup", "transfer", "bias", "limits", "arithmetic", "error", "output", "setpoint"]
 
 
 def settings(card: str, **values: object) -> Settings:
@@ -41,13 +44,23 @@ def differences(
     return {d.aspect: d for d in nonlinear_differences(source, target, scans, (time, size))}
 
 
-def excursion(s: Settings, time: float, size: float, h: float, limits: tuple[float, float] = (0, 100)) -> tuple[Floats, int, int]:
+def excursion(
+    s: Settings, time: float, size: float, h: float, limits: tuple[float, float] = (0, 100), ramp: float = 0.0
+) -> tuple[Floats, int, int]:
     """Output from rest at 50 through an error of 8 sizes, as much the other way, and none; where it turns, and where it ends."""
     n = round(time / h)
-    e = 4 * size * np.concatenate([np.ones(2 * n), -np.ones(3 * n), np.zeros(n)])
+    e = 8 * size * np.concatenate([np.ones(2 * n), -np.ones(3 * n), np.zeros(n)])
+    if ramp:
+        x = np.arange(6 * n) * h
+        e = 8 * size * np.interp(x, [0, ramp, 2 * time, 2 * time + ramp, 5 * time, 5 * time + ramp], [0, 1, 1, -1, -1, 0])
     controller = pidemu.Controller(s, h, output_limits=limits)
     controller.rest(50.0, 50.0, 50.0)
-    return controller.run(50 + e, 50 - e), 2 * n, 5 * n
+    return controller.run(np.full_like(e, 50.0), 50 - e), 2 * n, 5 * n
+
+
+def slow(both: tuple[Settings, Settings], time: float) -> float:
+    """Five times the longer derivative time, half the characteristic time at most."""
+    return min(5 * max(abs(a.kd / a.kp) for a in (s.algorithm() for s in both)), time / 2)
 
 
 @pytest.mark.parametrize(("h", "stays"), [(1.0, 13.0), (0.5, 13.0), (3.0, 12.0), (0.04, 13.12)])
@@ -61,8 +74,8 @@ def test_an_integral_without_windup_protection_comes_back_when_arithmetic_says(h
     assert (scans - 1) * h == pytest.approx(stays, abs=1e-9)
     # back-calculation holds the integral at 100, so that P of -64 leads away at once; float32 may round to the next scan
     assert found.figures[STAYS] == pytest.approx((0.0, stays), abs=h if h < 0.1 else 1e-9)
-    assert "generic/standard (back-calculation, Tt = 60 s) leaves it at once, iec/61131-3-pid (none) leaves it after" in found.text
-    assert "when an error of 32 % for 120 s" in found.text
+    story = "With the valve at 100 % and the error reversing, the old controller leaves the limit at once, the new one after "
+    assert found.text.startswith(f"{story}{found.figures[STAYS][1]:.4g} s.")
 
 
 def test_less_than_a_scan_is_no_difference() -> None:
@@ -70,16 +83,63 @@ def test_less_than_a_scan_is_no_difference() -> None:
     assert "windup" not in differences(source, target, (1.0, 0.1))  # 13.1 s, of which the first sees 13
 
 
-def test_provox_and_deltav_differ_in_the_way_back() -> None:
-    source = settings("fisher/provox", GAIN=2.0, RESET=1)
-    target = settings("emerson/deltav", GAIN=2.0, RESET=60)
+def test_both_may_leave_at_once_and_the_output_after_the_spell_differ() -> None:
+    K, Ti = 2.0, 60.0
+    source, target = settings("generic/standard", K=K, Ti=Ti), settings("allen-bradley/plc5", Kp=K, Ki=K / Ti, Kd=0)
     found = differences(source, target)["windup"]
-    assert "fisher/provox (external-reset) as well as emerson/deltav (external-reset, returning 16 times as fast)" in found.text
-    for s, stays, at_zero in zip((source, target), found.figures[STAYS], found.figures[AT_ZERO], strict=True):
-        output, turn, end = excursion(s, 60.0, 4.0, 1.0)
-        assert output[turn - 1] == 100
-        assert stays == np.count_nonzero(output[turn:end] == 100)
+    assert found.figures[STAYS] == (0.0, 0.0)
+    for s, at_zero in zip((source, target), found.figures[AT_ZERO], strict=True):
+        output, turn, _ = excursion(s, 60.0, 4.0, 1.0)
+        assert (output[turn - 1], output[turn] < 100) == (100, True)
         assert at_zero == output[-1]
+    assert found.figures[AT_ZERO][1] == 50  # P alone saturates, so that the integral of the PLC-5 never moves
+    assert found.text.startswith(
+        "With the valve at 100 % and the error reversing, both controllers leave the limit at once; after 180 s of error the other "
+        f"way and back at zero, the output is {found.figures[AT_ZERO][0]:.4g} % on the old controller and 50 % on the new one, "
+        "until the loop removes the difference."
+    )
+
+
+def test_schemes_of_different_names_that_behave_alike_have_no_difference() -> None:
+    """Positive feedback with and without a fast way back: where P is on the error, the fast one never gets its turn."""
+    source, target = settings("fisher/provox", GAIN=2.0, RESET=1), settings("emerson/deltav", GAIN=2.0, RESET=60)
+    for s in (source, target):
+        np.testing.assert_allclose(excursion(s, 60.0, 4.0, 1.0)[0], excursion(source, 60.0, 4.0, 1.0)[0], rtol=0, atol=1e-9)
+    assert source.algorithm().gate != target.algorithm().gate
+    assert "windup" not in differences(source, target)
+    velocity, recomputed = settings("yokogawa/fieldbus-pid", GAIN=2, RESET=60), settings("allen-bradley/pide", PGain=2, IGain=2)
+    assert "windup" not in differences(velocity, recomputed)
+    conditional, other = settings("mathworks/pid2", Kp=2, Ki=2 / 60), settings("iec/61131-3-pid", KP=-2, TR=60)
+    assert conditional.algorithm().windup == other.algorithm().windup == "none"
+    assert "windup" not in differences(conditional, other)
+
+
+def test_noise_and_derivative_at_a_limit_show_what_steps_do_not() -> None:
+    """A velocity controller drifts off the limit: what noise adds is kept, what it takes away is cut off at the limit."""
+    source = settings("generic/standard", K=2, Ti=60, Td=8, Tf=1)
+    target = settings("yokogawa/fieldbus-pid", GAIN=2, RESET=60, RATE=8)
+    found = differences(source, target)["windup"]
+    record = standard_record(1.0, time=60.0, size=4.0)
+    outputs = []
+    for s in (source, target):
+        controller = pidemu.Controller(s, 1.0, output_limits=(0, 100))
+        controller.rest(50.0, 50.0, 50.0)
+        raw = controller.run(record.sp[-360:], record.pv[-360:])
+        outputs.append(np.convolve(raw, np.ones(6) / 6)[:360])
+    worst = 180 + int(np.argmax(np.abs(outputs[0] - outputs[1])[180:]))
+    assert found.figures[WITH_NOISE] == pytest.approx((outputs[0][worst], outputs[1][worst]), abs=1e-9)
+    assert outputs[1][worst] - outputs[0][worst] > 30
+    pair = Recovery(100, True, 0.0, 50.0), Recovery(100, True, 0.0, 50.0)
+    alike = Recoveries(pair, short=False, late=False, apart=False, noisy=(1.25, 40.5), noisy_at=57.0)
+    assert windup.story(alike, Plan(60.0, 4.0, (0.0, 100.0)), sides(source, target, (1.0, 1.0))) == (
+        "Coming back from 0 % along a ramp of PV with noise of 0.5 %, 57 s after PV has turned, the output is 1.25 % on the old "
+        "controller and 40.5 % on the new one; without noise they are alike."
+    )
+
+
+def test_what_the_linear_laws_make_different_is_no_difference_at_a_limit() -> None:
+    found = differences(settings("generic/standard", K=2, Ti=60), settings("generic/standard", K=2.1, Ti=63))
+    assert "windup" not in found  # the same scheme; 5 % of the gain move the output after the spell as well
 
 
 @pytest.mark.parametrize(
@@ -97,10 +157,12 @@ def test_times_and_outputs_are_those_of_an_emulation(source: str, target: str) -
     pair = dict(SOURCES)[source], dict(SOURCES)[target]
     found = differences(*pair, time=90.0)["windup"]
     for s, stays, at_zero in zip(pair, found.figures[STAYS], found.figures[AT_ZERO], strict=True):
-        output, turn, end = excursion(s, 90.0, 4.0, 1.0)
+        low, high = limits_for(pair[0], None, (0.0, 100.0))
+        ramp = slow(pair, 90.0)
+        output, turn, end = excursion(s, 90.0, 4.0, 1.0, (low, high), ramp)
         reached = output[turn - 1]
-        held = np.flatnonzero(output[turn:end] == reached)
-        assert stays == (held[-1] + 1 if held.size and reached in (0, 100) else 0)
+        held = np.flatnonzero(output[turn + math.ceil(ramp / 2) : end] == reached)
+        assert stays == (held[-1] + 1 if held.size and reached in (low, high) else 0)
         assert at_zero == pytest.approx(output[-1], abs=1e-9)
 
 
@@ -109,26 +171,33 @@ def test_an_integral_that_stands_still_at_a_limit_both_ways_never_leaves_it(tmp_
         VALID,
         ("{scheme: back-calculation, tracking-time: Ti}", "{scheme: freeze, direction: both}"),
         ("proportional: {on: error}", "proportional: {on: none}"),
+        ("{kp: 2,", "{kp: 0,"),
     )
     card = pidemu.load_card(written(tmp_path, stuck))
     found = differences(card.settings(GAIN=2, RESET=60), settings("generic/parallel", kp=0, ki=2 / 60))["windup"]
     assert found.figures[STAYS][0] == math.inf
-    assert "does not leave it within 180 s" in found.text
+    assert "the old controller stays there for the 180 s that this lasts" in found.text
     assert found.figures[AT_ZERO][0] == 100
 
 
-def test_where_no_limit_is_reached_the_words_say_so() -> None:
-    found = differences(settings("generic/standard", K=0.1, Ti=60), settings("iec/61131-3-pid", KP=-0.1, TR=60), size=20.0)[
-        "windup"
-    ]
-    assert "an error of 90 % for 120 s brings neither there" in found.text
-    assert found.figures[STAYS] == (0.0, 0.0)
+def test_a_low_gain_starts_nearer_to_the_limit_so_that_it_gets_there() -> None:
+    """K = 0.1: an error of 45 % for two integral times moves the output by 13.5 %, which from 50 % would reach no limit."""
+    K, Ti, time, error = 0.1, 60.0, 60.0, 45.0
+    found = differences(settings("generic/standard", K=K, Ti=Ti), settings("iec/61131-3-pid", KP=-K, TR=Ti), size=20.0)["windup"]
+    start = 100 - 0.6 * K * error * (1 + 2 * time / Ti)
+    integral = start + K * error * 2 * time / Ti
+    scans = next(j for j in itertools.count(1) if integral - j * K * error / Ti - K * error < 100)
+    # both rest at `start`; the integral without protection needs these scans
+    assert found.figures[STAYS] == pytest.approx((0.0, scans - 1), abs=1e-9)
 
 
-def test_the_same_scheme_with_another_tracking_time_is_a_difference() -> None:
-    found = differences(settings("generic/standard", K=2, Ti=60), settings("astrom-hagglund/listing", K=2, Ti=60, Td=0, Tt=5, N=10))
-    assert "(back-calculation, Tt = 60 s)" in found["windup"].text
-    assert "(back-calculation, Tt = 5 s)" in found["windup"].text
+def test_another_tracking_time_is_a_difference_where_it_shows() -> None:
+    source = settings("generic/standard", K=2, Ti=60)
+    found = differences(source, settings("astrom-hagglund/listing", K=2, Ti=60, Td=0, Tt=300, N=10))["windup"]
+    assert found.figures[AT_ZERO][0] > 5  # Tt = Ti lets the integral come back within the spell
+    assert found.figures[AT_ZERO][1] == 0
+    near = settings("astrom-hagglund/listing", K=2, Ti=60, Td=0, Tt=59.5, N=10)
+    assert "windup" not in differences(source, near)
 
 
 def test_loading_the_output_bumps_by_the_other_terms() -> None:
@@ -137,15 +206,15 @@ def test_loading_the_output_bumps_by_the_other_terms() -> None:
     error = -size / 2  # the measurement is that much above the setpoint
     assert found.figures[TO_AUTO] == pytest.approx((0.0, K * error + ki * 1.0 * error), abs=1e-9)
     assert found.figures[TO_MANUAL] == (0.0, 0.0)
-    assert f"generic/parallel {STARTS['bumpless']} and arduino/pid {STARTS['load-output']}" in found.text
-    assert "the output bumps by 0 % on the source and -4.04 % on the target" in found.text
+    assert f"generic/parallel {STARTS['bumpless']}, arduino/pid {STARTS['load-output']}" in found.text
+    assert "with PV 2 % above SP, the output jumps by 0 % on the old controller and -4.04 % on the new one" in found.text
 
 
 def test_the_iec_example_bumps_at_the_transfer_to_manual_as_it_multiplies_the_operators_output() -> None:
     found = differences(settings("generic/standard", K=2, Ti=60), settings("iec/61131-3-pid", KP=-2, TR=60))["transfer"]
     assert found.figures[TO_MANUAL] == pytest.approx((0.0, (-2 - 1) * 50.0), abs=1e-4)
     assert "iec/61131-3-pid multiplies the operator's output by the gain" in found.text
-    assert "to manual, where the operator's output is what the output was, by 0 % on the source and -150 % on" in found.text
+    assert "Switched to manual at the output that there is, it jumps by 0 % on the old controller and -150 % on" in found.text
 
 
 def test_an_integral_that_runs_on_in_manual_makes_the_output_jump() -> None:
@@ -172,8 +241,8 @@ def test_bumps_are_per_cent_of_the_output_range(source: str) -> None:
 
 
 def test_a_wider_measurement_range_of_the_target_does_not_count_as_a_larger_error() -> None:
-    source = settings("generic/standard", K=2, Ti=60, pv_range=(0, 100), op_range=(0, 100))
-    conversion = pidemu.convert(source, "iec/61131-3-pid", pv_range=(0, 400))
+    source = settings("generic/standard", K=2, Ti=60, pv_range=(0, 100, "degC"), op_range=(0, 100))
+    conversion = pidemu.convert(source, "iec/61131-3-pid", to_pv_range=(0, 400, "degC"))
     found = differences(source, conversion.settings)["windup"]
     assert found.figures[STAYS] == (0.0, 13.0)
 
@@ -183,15 +252,27 @@ def test_gains_of_the_other_sign_bump_the_same_way() -> None:
     conversion = pidemu.convert(source, "arduino/pid", given={})
     found = differences(source, conversion.settings)
     assert "transfer" not in found  # both load the output
-    assert found["windup"].figures[STAYS] == (0.0, 0.0)
+    assert "windup" not in found  # their sums are limited in other places of the scan, and come out alike
 
 
-def test_without_integral_the_bias_is_named() -> None:
-    neither = differences(settings("generic/standard", K=2, Ti=math.inf), settings("generic/parallel", kp=2, ki=0))
-    assert "carry it over" in neither["transfer"].text
-    assert "windup" not in neither
-    ways = differences(settings("generic/standard", K=2, Ti=math.inf), settings("king/velocity", KC=2, TI=math.inf))
-    assert "counts from different starts" in ways["transfer"].text
+def test_without_integral_a_positional_target_has_its_bias_open() -> None:
+    p_only = settings("generic/standard", K=2, Ti=math.inf)
+    neither = differences(p_only, settings("generic/parallel", kp=2, ki=0))
+    assert neither["bias"].text.startswith("Open: the bias.")
+    assert "while SP = PV, or give it with --bias" in neither["bias"].text
+    assert {"windup", "transfer"}.isdisjoint(neither)
+    assert "bias" not in differences(p_only, settings("king/velocity", KC=2, TI=math.inf))  # it has none
+    assert "bias" in differences(settings("king/velocity", KC=2, TI=math.inf), p_only)
+    assert "bias" not in differences(settings("generic/standard", K=2, Ti=60), settings("generic/parallel", kp=2, ki=2 / 60))
+
+
+def test_without_integral_what_a_limit_leaves_behind_is_told() -> None:
+    found = differences(settings("generic/standard", K=2, Ti=math.inf), settings("king/velocity", KC=2, TI=math.inf))["windup"]
+    assert found.figures == {"output after an excursion to the limit and back [% of output span]": (50.0, 20.0)}
+    assert found.text == (
+        "When PV moves by 40 %, so that the output stands at 100 %, and comes back, the output of the old controller goes from 50 "
+        "to 50 %, that of the new one to 20 %. Without integral action nothing removes this difference, and every limit adds to it."
+    )
 
 
 def test_a_controller_that_cannot_be_emulated_leaves_the_words_and_says_why() -> None:
@@ -199,7 +280,7 @@ def test_a_controller_that_cannot_be_emulated_leaves_the_words_and_says_why() ->
     target = settings("mathworks/pid2", Kp=2, Ki=2 / 60, Kd=20, Tf=0.1)
     found = differences(source, target)
     assert "the forward rule is unstable" in found["windup"].text
-    assert "generic/standard back-calculation, Tt = 60 s, mathworks/pid2 none" in found["windup"].text
+    assert found["windup"].text.endswith("mathworks/pid2: none: the integral goes on.")
     assert found["windup"].figures == {}
     assert STARTS["running"] in found["transfer"].text
     assert found["transfer"].figures == {}
@@ -217,13 +298,15 @@ def test_scan_intervals_far_apart_get_a_time_that_both_can_show(scan: tuple[floa
 
 def test_scan_intervals_too_far_apart_are_not_tried() -> None:
     found = differences(settings("generic/standard", K=2, Ti=60), settings("arduino/pid", Kp=2, Ki=2 / 60), (60.0, 0.01))
-    assert "arduino/pid cannot be: its scan interval of 0.01 s is too short beside the other's" in found["windup"].text
+    assert "arduino/pid cannot be emulated: its scan interval of 0.01 s is too short beside the other's" in found["windup"].text
 
 
 def test_an_output_that_overflows_is_no_figure() -> None:
-    source = settings("astrom-hagglund/listing", K=5.7, Ti=2180, Td=576, Tt=1.5, N=3.8)
+    source = settings("astrom-hagglund/listing", K=5.7, Ti=2180, Td=0, Tt=0.0015, N=3.8)
     found = differences(source, settings("generic/standard", K=5.7, Ti=2180), 60.0, *scale_of(source, 60.0))["windup"]
-    assert "overflows at a scan interval of 60 s: the tracking time of 1.5 s is less, and back-calculation overshoots" in found.text
+    assert (
+        "overflows at a scan interval of 60 s: the tracking time of 0.0015 s is less, and back-calculation overshoots" in found.text
+    )
     assert found.figures == {}
 
 
@@ -233,27 +316,30 @@ def test_settings_against_themselves_differ_in_nothing() -> None:
 
 
 def test_every_pair_of_cards_has_its_differences_in_words_and_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: dict[object, Trial] = {}
+    seen: dict[object, object] = {}
 
-    def once(side: Side, plan: Plan, action: Action, span: float) -> Trial:
+    def once(of: Callable[..., object]) -> Callable[..., object]:
         """Emulate every card once with the same limits, not once in every pair."""
-        key = (side.name, plan, action, span)
-        return seen[key] if key in seen else seen.setdefault(key, tried(side, plan, action, span))
 
-    monkeypatch.setattr(nonlinear, "tried", once)
+        def call(bench: Bench, *arguments: object, **named: object) -> object:
+            key = (of.__name__, bench.key, arguments, tuple(named.items()))
+            return seen[key] if key in seen else seen.setdefault(key, of(bench, *arguments, **named))
+
+        return call
+
+    monkeypatch.setattr(Bench, "course", once(Bench.course))
+    monkeypatch.setattr(Bench, "transfers", once(Bench.transfers))
     for (a, source), (b, target) in itertools.permutations(SOURCES, 2):
         found = nonlinear_differences(source, target, (1.0, 1.0), (90.0, 4.0))
         aspects = [d.aspect for d in found]
         assert aspects == sorted(aspects, key=ASPECTS.index), (a, b)
         named = {d.aspect: d for d in found}
-        both = source.algorithm(), target.algorithm()
-        if all(x.ki for x in both) and both[0].windup != both[1].windup:
-            assert set(named["windup"].figures) == {STAYS, AT_ZERO}, (a, b)
-        if both[0].start != both[1].start:
+        if "windup" in named and all(x.algorithm().ki for x in (source, target)):
+            assert {STAYS, AT_ZERO} <= set(named["windup"].figures), (a, b)
+        if "transfer" in named:
             assert set(named["transfer"].figures) == {TO_AUTO, TO_MANUAL}, (a, b)
-        if {x.precision for x in both} != {"float64"} and both[0].precision != both[1].precision:
-            assert "arithmetic" in named, (a, b)
         for d in found:
-            assert d.text, (a, b)
+            assert d.text[0].isupper() or d.text.startswith((a, b)), (a, b, d.text)
+            assert d.text.endswith("."), (a, b, d.text)
             assert not any(math.isnan(x) for pair in d.figures.values() for x in pair), (a, b, d)
     assert len(CARDS) >= 31

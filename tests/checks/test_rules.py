@@ -31,6 +31,7 @@ from tests.checks.bench import (
 _UNITS = "1, %/%, %, eu, eu/eu, %/eu, Hz, " + ", ".join(
     f"{time}, {time}/repeat, repeat/{time}, 1/{time}, %/{time}, eu/{time}" for time in ("ms", "s", "min", "h")
 )
+_UNITS += "; also scan in place of a time, and degC, K, degF in place of eu"
 _ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero"
 _FILTER_GAIN: tuple[Edit, ...] = (
     ("ratio: ALPHA", "gain: ALPHA"),
@@ -38,6 +39,8 @@ _FILTER_GAIN: tuple[Edit, ...] = (
     ("off: 0, default: 0}\n  ALPHA", "off: 0}\n  ALPHA"),
     ("RATE: 16}", "RATE: 16, ALPHA: 8}"),
 )
+_ENGINEERING = added("signals", "engineering")
+_EU = ('unit: "%/%"', "unit: eu/eu")
 _NO_ALPHA: tuple[Edit, ...] = ((ALPHA, ""), (ALPHA_EVIDENCE, ""))
 
 STATEMENTS: tuple[Case, ...] = (
@@ -68,6 +71,18 @@ STATEMENTS: tuple[Case, ...] = (
         "reject_incomplete_evidence",
         (("derivative: {status: assumed, note: not stated}", "derivative: {status: assumed}"),),
         ("34:3: 'assumed' needs 'note'",),
+    ),
+    (
+        "reject_proof_from_another_product",
+        (
+            ("read: 2026-01-02}", "read: 2026-01-02}\n  toy: {title: Toy bench, read: 2026-01-02, product: another bench}"),
+            ("form: {status: documented, source: manual,", "form: {status: documented, source: toy,"),
+            ("implementation: {status: measured, source: manual,", "implementation: {status: measured, source: toy,"),
+        ),
+        (
+            "31:18: 'toy' is about another bench, which does not make this documented; write 'inferred' and why",
+            "32:28: 'toy' is about another bench, which does not make this measured; write 'inferred' and why",
+        ),
     ),
     (
         "reject_evidence_for_nothing",
@@ -133,7 +148,42 @@ EQUATIONS: tuple[Case, ...] = (
             ("form: standard", "signals: engineering\nform: standard"),
             ("  form: {status", "  signals: {status: assumed, note: so\n    }\n  form: {status"),
         ),
-        ("15:28: with 'signals: engineering' the gain's unit is 'eu/eu'",),
+        ("15:28: with 'signals: engineering' the gain's unit is 'eu/eu', '%/eu', or for a proportional band 'eu'",),
+    ),
+    (
+        "reject_bad_units",
+        (*_ENGINEERING, ('unit: "%/%"', "unit: eu"), ("limits: [0, 100]", "limits: [0, inf]")),
+        ("15:28: 'eu' refers to the output's range, and 'output.limits' is infinite; give limits, or a gain in 'eu/eu'",),
+    ),
+    (
+        "reject_bad_units",
+        (*_ENGINEERING, ("form: standard", "form: parallel"), ('unit: "%/%"', "unit: '%/degC'")),
+        ("15:28: with 'signals: engineering' the gain of a parallel form is in 'eu/eu', as its integral and derivative gains are",),
+    ),
+    (
+        "reject_bad_units",
+        (*_ENGINEERING, _EU, (ALPHA, "  ZERO: {sets: bias, unit: '%', default: 0}\n" + ALPHA)),
+        ("18:28: with 'signals: engineering' the bias is in 'eu'",),
+    ),
+    (
+        "reject_bad_units",
+        (
+            *added("setpoint", "{rate: RAMP}"),
+            *_ENGINEERING,
+            _EU,
+            (ALPHA, "  RAMP: {sets: setpoint-rate, unit: '%/scan', default: inf}\n" + ALPHA),
+        ),
+        ("19:37: with 'signals: engineering' the setpoint rate is in 'eu/scan'",),
+    ),
+    (
+        "reject_mixed_degrees",
+        (
+            *added("setpoint", "{rate: RAMP}"),
+            *_ENGINEERING,
+            ('unit: "%/%"', "unit: degC"),
+            (ALPHA, "  RAMP: {sets: setpoint-rate, unit: degF/min, default: inf}\n" + ALPHA),
+        ),
+        ("19:37: 'degF/min', but 'GAIN' is in 'degC'; the signals are in one of them",),
     ),
     (
         "reject_bad_units",
@@ -163,9 +213,10 @@ EQUATIONS: tuple[Case, ...] = (
             "or 'options.STRUCTURE.choices.I-PD.settings.RATE'",
         ),
     ),
-    ("reject_bad_scan", (("default: 1 s", "default: 0 s"),), ("27:17: '0 s' is no time; write it like '1 s'",)),
-    ("reject_bad_scan", (("default: 1 s", 'default: "1"'),), ("27:17: '1' is no time; write it like '1 s'",)),
-    ("reject_bad_scan", (("default: 1 s", "default: 1 %"),), ("27:17: '1 %' is no time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", "default: 0 s"),), ("27:17: '0 s' is not a time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", 'default: "1"'),), ("27:17: '1' is not a time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", "default: 1 scan"),), ("27:17: '1 scan' is not a time; write it like '1 s'",)),
+    ("reject_bad_scan", (("default: 1 s", "default: 1 %"),), ("27:17: '1 %' is not a time; write it like '1 s'",)),
     (
         "reject_bad_scan",
         (("default: 1 s", "default: fast"),),
@@ -331,6 +382,23 @@ EQUATIONS: tuple[Case, ...] = (
         ("11:55: 'rule' here is that of a filter on measurement or output; the term's is 'derivative.rule'",),
     ),
     (
+        "reject_bad_filter",
+        (
+            ("ratio: ALPHA", "ratio: ALPHA, of: effective-derivative"),
+            ("form: standard", "form: parallel"),
+        ),
+        ("11:67: 'effective-derivative' is of a series or standard form; of a parallel one, kd/kp is 'derivative-time'",),
+    ),
+    (
+        "reject_bad_filter",
+        (
+            ("ratio: ALPHA", "ratio: ALPHA, of: derivative-time"),
+            ("form: standard", "form: parallel"),
+            (CHOICE, "{proportional: {on: none}}"),
+        ),
+        ("11:67: 'derivative-time' is kd/kp, and this card has no proportional term",),
+    ),
+    (
         "reject_bad_windup",
         ((WINDUP, "{scheme: velocity}"),),
         ("10:39: windup 'velocity' does not go with implementation 'positional'",),
@@ -343,10 +411,7 @@ EQUATIONS: tuple[Case, ...] = (
     (
         "reject_bad_windup",
         ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
-        (
-            "10:42: external-reset is defined for the backward and forward rules",
-            "10:42: external-reset needs P on the error: positive feedback of another P settles beyond the limit",
-        ),
+        ("10:42: external-reset is defined for the backward and forward rules",),
     ),
     (
         "reject_bad_windup",
@@ -392,6 +457,14 @@ EQUATIONS: tuple[Case, ...] = (
 )
 
 RUNS: tuple[Case, ...] = (
+    (
+        "reject_windup_that_stops_short",
+        ((WINDUP, "{scheme: conditional, last-increment: dropped}"),),
+        (
+            "10:39: under a constant error the output stays at 99.79 % and never reaches its limit; only what is documented or "
+            "measured may do that",
+        ),
+    ),
     ("reject_wrong_examples", (("{kp: 2,", "{kp: 3,"),), ("46:21: kp is 3, the settings amount to 2",)),
     ("reject_wrong_examples", ((", Tf: 2}", "}"),), ("46:16: Tf is 0, the settings amount to 2",)),
     (

@@ -63,6 +63,11 @@ CASES: tuple[Case, ...] = (
         added("setpoint", "{starts: zero}"),
         ("9:20: 'starts: zero' belongs to a setpoint with a 'rate'",),
     ),
+    (
+        "reject_bad_setpoint",
+        added("setpoint", "{rate-counts: local}"),
+        ("9:1: 'rate-down' and 'rate-counts' belong to a setpoint with a 'rate'",),
+    ),
     ("reject_bad_error", added("error", "{shape: gap}"), ("9:1: shape 'gap' needs 'band'",)),
     ("reject_bad_error", added("error", "{shape: gain-linear}"), ("9:1: shape 'gain-linear' needs 'linearity'",)),
     ("reject_bad_error", added("error", "{shape: squared, band: 2}"), ("9:1: 'band' has no meaning with shape 'squared'",)),
@@ -156,12 +161,17 @@ CASES: tuple[Case, ...] = (
     (
         "reject_bad_windup_details",
         ((WINDUP, "{scheme: freeze, test: error-times-output}"),),
-        ("10:39: 'test' belongs to 'conditional'",),
+        ("10:39: 'test' and 'last-increment' belong to 'conditional'",),
     ),
     (
         "reject_bad_windup_details",
-        ((WINDUP, "{scheme: freeze, direction: both, fast-return: 16}"),),
-        ("10:39: 'fast-return' has no meaning with 'direction: both', which stops the way back as well",),
+        ((WINDUP, "{scheme: conditional, test: error-times-output}"),),
+        ("10:39: 'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'",),
+    ),
+    (
+        "reject_bad_windup_details",
+        ((WINDUP, "{scheme: conditional, last-increment: dropped}"), ("rule: backward", "rule: forward")),
+        ("10:38: 'last-increment' has no meaning under the forward rule, whose increment comes after the output",),
     ),
     (
         "reject_bad_windup_details",

@@ -12,7 +12,7 @@ from tests.checks.bench import CHOICE, VALID, WINDUP, Edit, edited, faults, head
 
 _SETS = (
     "'gain', 'multiplier', 'integral', 'derivative', 'filter-time', 'filter-ratio', 'filter-gain', 'proportional-weight', "
-    "'derivative-weight', 'tracking-time', 'filter-factor', 'integral-limit', 'deadband', 'gap-gain', 'linearity', "
+    "'derivative-weight', 'tracking-time', 'filter-factor', 'integral-limit', 'windup-limit', 'deadband', 'gap-gain', 'linearity', "
     "'feedforward-gain', 'bias', 'output-rate', 'setpoint-rate', 'resolution', 'process-gain', 'process-time', 'process-delay' "
     "or 'closed-loop-time'"
 )

@@ -249,3 +249,22 @@ def test_the_version_is_the_package_s() -> None:
 def test_every_command_has_help(command: str) -> None:
     assert told(command, "--help").startswith(f"Usage: pidemu {command} ")
     assert f"\n  {command} " in told("--help")
+
+
+def test_show_with_settings_explains_them_and_with_options_alone_it_is_the_data_sheet() -> None:
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE="6 s")
+    assert told("show", "fisher/provox", "GAIN=2", "RESET=4", "RATE=6 s") == pidemu.explain(settings).text
+    assert "\nEvidence\n" in told("show", "emerson/deltav", "FORM=Series")
+
+
+def test_show_with_a_scan_interval_and_ranges_explains_at_them() -> None:
+    settings = pidemu.load_card("bailey/fc19").settings(K=1, KP=2.5, pv_range=(0, 400), op_range=(0, 100))
+    words = ("show", "bailey/fc19", "K=1", "KP=2.5", "--pv-range", "0,400", "--op-range", "0,100", "--scan", "0.5 s")
+    assert told(*words) == pidemu.explain(settings, 0.5).text
+    assert strict_json(told(*words, "--json")) == pidemu.explain(settings, 0.5).to_dict()
+
+
+def test_show_with_a_setting_that_is_missing_says_so() -> None:
+    assert said("show", "fisher/provox", "GAIN=2") == (
+        2, "", "error: fisher/provox: RESET: missing; it sets the integral (reset rate), in repeat/min\n",
+    )  # fmt: skip

@@ -12,6 +12,7 @@ import pytest
 
 import pidemu
 from pidemu.card.library import card_files
+from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, told
 from tests.targets.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
 
@@ -167,3 +168,66 @@ def test_what_cannot_be_printed_is_told(folder: Path, words: str, message: str) 
     found = said("code", *_PROVOX, *words.split())
     assert (found.status, found.out) == (2, "")
     assert found.err.endswith(message)
+
+
+# --- what the program rests on --------------------------------------------------------------------------------------------------
+
+_RESTS_ON = [
+    "Assumed or inferred in the card fisher/provox, and at work here:",
+    "- assumed: implementation = positional (not found in anything readable)",
+    "- assumed: integral.rule = backward (no scan equation was found)",
+    "- assumed: integral.windup.scheme = external-reset "
+    "(not found; positive feedback is how series controllers of that descent work)",
+    "- assumed: transfer.start = bumpless (not found)",
+    "- assumed: scan.default = 1 s (not found)",
+    "- assumed: output.limits = 0 to 100 (not found)",
+]
+_HOSTILE = r'"*/ } int x; /* (* ??/ \\ \n \u2028 \u202e \0 # coding: nonsense *)"'
+"""As YAML writes it, between quotation marks."""
+
+
+@pytest.mark.parametrize(("lang", "first", "mark"), [("python", 2, "#"), ("c", 3, " *")])
+def test_the_comment_at_the_top_names_what_the_card_assumes_of_the_program_a_line_each(lang: str, first: int, mark: str) -> None:
+    lines = told("code", "fisher/provox", "GAIN=2", "RESET=4", "--lang", lang).splitlines()
+    assert lines[first : first + len(_RESTS_ON) + 1] == [
+        *(f"{mark} {line}" for line in _RESTS_ON),
+        "" if lang == "python" else mark,
+    ]
+
+
+def test_both_c_files_name_it(folder: Path) -> None:
+    told("code", "fisher/provox", "GAIN=2", "RESET=4", "--lang", "c", "--out", ".", "--name", "level")
+    for file in ("level.h", "level.c"):
+        assert f" * {_RESTS_ON[2]}\n" in (folder / file).read_text()
+
+
+def test_what_is_given_is_not_the_cards_assumption() -> None:
+    text = told("code", "fisher/provox", "GAIN=2", "RESET=4", "--scan", "1", "--limits", "0,100")
+    assert "scan.default" not in text
+    assert "output.limits" not in text
+
+
+def test_a_card_of_which_everything_is_stated_says_so() -> None:
+    assert "# Every field of the card arduino/pid that makes this program is documented or measured.\n" in told(
+        "code", "arduino/pid", "Kp=2", "Ki=1", "Kd=0", "--scan", "0.1", "--limits", "0,255"
+    )
+
+
+def test_no_text_of_a_card_gets_out_of_a_comment(folder: Path) -> None:
+    hostile = VALID.replace("note: not stated", f"note: {_HOSTILE}").replace("      PID: {}", f"      {_HOSTILE}: {{}}")
+    hostile = hostile.replace("default: PID", f"default: {_HOSTILE}")
+    card = str(written(folder, hostile))
+    settings = pidemu.load_card(card).settings(GAIN=2, RESET=60)
+    controller = pidemu.Controller(settings)
+    words = (card, "GAIN=2", "RESET=60")
+    scans = signals(0, 100)
+    told("code", *words, "--out", ".", "--name", "level")
+    assert "# - assumed: transfer.start = bumpless ( * / } int x; / * ( * ? ?/ " in (folder / "level.py").read_text(
+        encoding="utf-8"
+    )
+    names: dict[str, Any] = {}
+    exec(compile((folder / "level.py").read_bytes(), "level.py", "exec"), names)  # bytes: a declared encoding would count
+    assert run_scan_by_scan(names, scans) == [controller.scan(*s) for s in scans]
+    told("code", *words, "--lang", "c", "--out", ".", "--name", "level")
+    if COMPILER is not None:
+        assert refused("-std=c99", *WARNINGS, "-c", "level.c", folder=folder) == ""

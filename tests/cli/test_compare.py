@@ -31,7 +31,7 @@ def after(text: str, title: str) -> list[list[str]]:
 def test_differences_are_stated_overall_and_by_part_of_the_record() -> None:
     out = told("compare", *A, *B)
     assert out.splitlines()[:4] == [
-        "standard record: 1120 scans, 1119 s; moves of 4 %, 40 s each",
+        "standard record: 1360 scans, 1359 s; moves of 4 %, 40 s each",
         "  card                  scan  settings",
         "  generic/standard       1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=1, c=1",
         "  generic/standard (2)   1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=0.5, c=1",

@@ -235,7 +235,7 @@ class TestAllOptions:
     def test_there_is_a_line_for_each_choice_the_best_first(self) -> None:
         rows = section(told(*PROVOX, "--all-options"), "Choices of the options")
         assert rows[0] == ["options", "verdict", "loop", "band", "setpoint", "path"]
-        assert len(rows) - 1 == 2 * 8  # FORM and STRUCTURE
+        assert len(rows) - 1 == 2 * 8 * 2  # FORM, STRUCTURE and FRSIPID_OPTS, whose gap nobody gave: refused
         verdicts = [next(w for w in row if w in ("exact", "exact-feedback", "approximate", "refused")) for row in rows[1:]]
         order = ["exact", "exact-feedback", "approximate", "refused"]
         assert verdicts == sorted(verdicts, key=order.index)
@@ -243,11 +243,15 @@ class TestAllOptions:
         assert ["as", "the", "card", "delivers", "them", "exact-feedback", "none", "34", "%"] in rows
 
     def test_the_best_is_the_one_that_is_taken(self) -> None:
-        assert converted(*PROVOX, "--all-options")["to"]["options"] == {"FORM": "Standard", "STRUCTURE": "7"}
+        assert converted(*PROVOX, "--all-options")["to"]["options"] == {
+            "FORM": "Standard",
+            "STRUCTURE": "7",
+            "FRSIPID_OPTS": "none",
+        }
 
     def test_what_is_set_is_not_varied(self) -> None:
         rows = section(told(*PROVOX, "--all-options", "--set", "STRUCTURE=1"), "Choices of the options")
-        assert len(rows) - 1 == 2
+        assert len(rows) - 1 == 2 * 2  # FORM and FRSIPID_OPTS
         assert not any("STRUCTURE" in word for row in rows for word in row)
 
     def test_without_being_asked_for_there_is_no_table(self) -> None:

@@ -16,6 +16,7 @@ import pidemu
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.result import FleetResult
+from pidemu.loop.figures import loop_figures
 from tests.cli.helpers import said, strict_json, told
 
 HEAD = "tag,card,settings,process,scan,time\n"
@@ -53,7 +54,7 @@ def chosen() -> str:
 def test_the_loops_are_run_and_shown_the_largest_iae_first() -> None:
     out = told("fleet", "good.csv")
     lines = out.splitlines()
-    assert lines[0] == "good.csv: 2 loops, 2 done"
+    assert lines[0] == "good.csv: 2 loops, 2 done; 1 not settled at the end"  # 100 s are too short for FIC-1
     assert lines[2] == "Loops, the largest IAE first"
     assert [line.split()[:4] for line in lines[4:]] == [
         ["TIC-2", "fisher/provox", "1", "s"],
@@ -68,7 +69,7 @@ def test_a_wrong_row_and_a_loop_that_cannot_be_run_are_said_at_their_lines_and_d
     assert status == 1
     unfit = "the scan interval -1 s is not a positive number; give the time between two scans"
     assert err.splitlines() == [f"loops.csv:3: LIC-3: {WHY}", f"loops.csv:5: PIC-4: {unfit}"]
-    assert out.splitlines()[0] == "loops.csv: 4 loops, 2 done, 2 failed"
+    assert out.splitlines()[0] == "loops.csv: 4 loops, 2 done, 2 failed; 1 not settled at the end"
     assert out.splitlines()[-3:] == ["Failed", "  line 3  LIC-3  fisher/provox", "  line 5  PIC-4  generic/standard"]
     found = rows("out.csv")
     assert {tag: row["status"] for tag, row in found.items()} == {
@@ -88,14 +89,46 @@ def test_a_file_of_which_no_row_makes_a_loop_fails(folder: Path) -> None:
 def test_a_loop_that_runs_away_is_a_result_and_stands_first(folder: Path) -> None:
     (folder / "away.csv").write_text(HEAD + FAST + RUNAWAY, encoding="utf-8")
     out = told("fleet", "away.csv")
-    assert out.splitlines()[0] == "away.csv: 2 loops, 1 done, 1 ran away"
+    assert out.splitlines()[0] == "away.csv: 2 loops, 1 done, 1 ran away; 2 not settled at the end"
     first = out.splitlines()[4].split()
     assert (first[0], first[-2:]) == ("XIC-5", ["ran", "away"])
 
 
+OSCILLATES = 'YIC-6,generic/standard,K=12; Ti=10,"gain=1,lag=10,delay=2",0.5,\n'
+
+
+def test_an_unstable_loop_is_called_so_and_stands_first_and_the_table_has_the_margins_of_all(folder: Path) -> None:
+    (folder / "swing.csv").write_text(HEAD + FAST + OSCILLATES, encoding="utf-8")
+    out = told("fleet", "swing.csv", "--table", "out.csv")
+    lines = out.splitlines()
+    assert lines[0] == "swing.csv: 2 loops, 1 done, 1 unstable; 2 not settled at the end"
+    assert lines[3].split()[-4:] == ["GM", "PM", "[deg]", "Ms"]
+    assert (lines[4].split()[0], lines[4].split()[-2:]) == ("YIC-6", ["inf", "unstable"])
+    assert lines[5].split()[-2:] == ["not", "settled"]
+    found = rows("out.csv")
+    assert [(row["status"], row["stable"], row["settled"]) for row in found.values()] == [
+        ("done", "True", "False"), ("unstable", "False", "False"),
+    ]  # fmt: skip
+    settings = pidemu.load_card("generic/standard").settings(K=2, Ti=10)
+    figures = loop_figures(settings.law(0.5), pidemu.Process.from_lags(1.0, lags=[10], delay=2))
+    row = found["FIC-1"]
+    assert (float(row["gain_margin"]), float(row["phase_margin"]), float(row["Ms"])) == (
+        figures.gain_margin, figures.phase_margin, figures.Ms,
+    )  # fmt: skip
+
+
+def test_without_margins_there_are_none_and_an_unstable_loop_has_only_not_settled(folder: Path) -> None:
+    (folder / "swing.csv").write_text(HEAD + OSCILLATES, encoding="utf-8")
+    lines = told("fleet", "swing.csv", "--no-margins", "--table", "out.csv").splitlines()
+    assert lines[0] == "swing.csv: 1 loop, 1 done; 1 not settled at the end"
+    assert "GM" not in lines[3]
+    row = rows("out.csv")["YIC-6"]
+    assert [row[name] for name in ("status", "stable", "gain_margin", "phase_margin", "Ms")] == ["done", "", "", "", ""]
+
+
 def test_twenty_loops_of_a_plant_are_shown() -> None:
     lines = told("fleet", "many.csv").splitlines()
-    assert lines[0] == "many.csv: 30 loops, 30 done"
+    assert lines[0] == "many.csv: 30 loops, 30 done; 30 not settled at the end"
     assert lines[2] == "The 20 loops with the largest IAE"
     assert len(lines) == 4 + 20
 
@@ -168,6 +201,8 @@ def test_json_holds_every_loop_with_its_line() -> None:
     assert [(row["tag"], row["line"], row["status"]) for row in found["loops"]] == [
         ("FIC-1", 2, "done"), ("LIC-3", 3, "failed"), ("TIC-2", 4, "done"), ("PIC-4", 5, "failed"),
     ]  # fmt: skip
+    assert [row["settled"] for row in found["loops"]] == [False, None, True, None]
+    assert (found["not_settled"], found["loops"][2]["stable"]) == (1, True)
     assert found["loops"][1]["reason"] == WHY
     assert found["loops"][2]["error"] == simulated().error[-1]
 
@@ -207,7 +242,7 @@ def test_ctrl_c_ends_the_run_and_prints_and_writes_what_is_done(folder: Path) ->
     done = [tag for tag, row in rows("out.csv").items() if row["status"] == "done"]
     assert 0 < len(done) < 301
     assert (process.returncode, err) == (1, f"interrupted: {len(done)} of 301 loops are done\n")
-    assert out.splitlines()[0] == f"long.csv: 301 loops, {len(done)} done, {301 - len(done)} not run"
+    assert out.splitlines()[0] == f"long.csv: 301 loops, {len(done)} done, {301 - len(done)} not run; 1 not settled at the end"
 
 
 REFUSED = {

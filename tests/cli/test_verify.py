@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import pidemu
-from tests.cli.helpers import said, strict_json, told
+from tests.cli.helpers import said, strict_json, told, with_another_filter
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--tag", "TIC-101", "--date", "2026-07-01")
 HEAD = f"TIC-101: fisher/provox -> emerson/deltav, certificate of 2026-07-01 by pidemu {pidemu.__version__}\n"
@@ -35,7 +35,7 @@ def test_a_changed_one_exits_with_1_and_says_what_and_by_which_version(certifica
     own = tmp_path / "cards" / "fisher"
     own.mkdir(parents=True)
     text = Path(pidemu.load_card("fisher/provox").document.path).read_text(encoding="utf-8")
-    (own / "provox.yaml").write_text(text.replace("ratio: 0.125", "ratio: 0.1"), encoding="utf-8")
+    (own / "provox.yaml").write_text(with_another_filter(text), encoding="utf-8")
     status, out, err = said("verify", "TIC-101.json", "--vendors", "cards")
     assert (status, err) == (1, "")
     assert out.startswith(f"{HEAD}changed:\n  - dial RATE: 5.25 s on the certificate, 5.4 s now\n")
@@ -85,7 +85,8 @@ def test_json_says_the_same(certificate: Path) -> None:
 def test_a_card_of_ones_own_comes_from_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cards" / "acme").mkdir(parents=True)
-    shutil.copy(pidemu.load_card("generic/series").document.path, tmp_path / "cards" / "acme" / "block.yaml")
+    text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
+    (tmp_path / "cards" / "acme" / "block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     signed = told("convert", "acme/block", "K=2", "Ti=15", "--to", "generic/standard", "--vendors", "cards", "--json")
     (tmp_path / "c.json").write_text(signed, encoding="utf-8")
     assert said("verify", "c.json", "--vendors", "cards").status == 0

@@ -13,12 +13,14 @@ from tests.cli.helpers import Said, said
 _LINES = {
     "convert": "convert [OPTIONS] [CARD] NAME=VALUE...",
     "run": "run [OPTIONS] CARD NAME=VALUE...",
-    "show": "show [OPTIONS] CARD [OPTION=CHOICE]...",
+    "show": "show [OPTIONS] CARD [NAME=VALUE]...",
     "cards": "cards [OPTIONS] [WORD]",
 }
 _PI = "fisher/provox GAIN=2 RESET=4"
 _TO = "--to emerson/deltav"
 _EXAMPLE = 'write for example GAIN=2 or "RESET=20 s/repeat"'
+_RANGE = 'is not a range; write low and high with a unit, such as "0,400 degC"'
+_ENDS = "is not a range; give two finite numbers, low before high"
 _NUMBER = 'is not a number, nor a number with a unit such as "20 s/repeat"'
 _SCAN = "is no scan interval; write seconds, such as 0.5, or 1,0.5 for source and target"
 _LISTS = "'pidemu cards' lists them"
@@ -44,12 +46,15 @@ CARDS_AND_OPTIONS = {
     "show provox": f"no card 'provox' (did you mean 'fisher/provox'?); {_LISTS}",
     "show ../fisher/provox": f"no card '../fisher/provox' (did you mean 'fisher/provox'?); {_LISTS}",
     "show block.yaml": "no file 'block.yaml'",
-    "show fisher/provox FORM=Series": "fisher/provox: unknown option 'FORM'; options: none",
-    "show emerson/deltav FROM=Series": "emerson/deltav: unknown option 'FROM' (did you mean 'FORM'?); options: FORM, STRUCTURE",
+    "show fisher/provox FORM=Series": "fisher/provox: unknown setting or option 'FORM'; settings: GAIN, RESET, RATE; options: none",
+    "show emerson/deltav FROM=Series": (
+        "emerson/deltav: unknown setting or option 'FROM' (did you mean 'FORM'?); settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA; "
+        "options: FORM, STRUCTURE"
+    ),
     "show emerson/deltav FORM=Seris": (
         "emerson/deltav: option FORM has no choice 'Seris' (did you mean 'Series'?); choices: Standard, Series"
     ),
-    "show emerson/deltav FORM": "'FORM' is not OPTION=CHOICE; write for example FORM=Series",
+    "show emerson/deltav FORM": "'FORM' is not NAME=VALUE; write for example GAIN=2 or \"RESET=20 s/repeat\"",
     "check nowhere": "no file or folder 'nowhere'",
     "check empty": "no .yaml file below 'empty'",
     "check --vendors nowhere": "no folder 'nowhere'; a folder of cards holds <vendor>/<block>.yaml",
@@ -110,11 +115,8 @@ SETTINGS = {
         "emerson/deltav: unknown setting 'ALFA' (did you mean 'ALPHA'?); "
         "settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA, FORM, STRUCTURE"
     ),
-    f"convert {_PI} {_TO} --pv-range 200,0": "fisher/provox: pv_range: 200 to 0 is no range; give low, then high",
-    f"convert {_PI} {_TO} --pv-range 0,inf": "fisher/provox: pv_range: 0 to inf is no range; give low, then high",
-    f"convert {_PI} {_TO} --to-pv-range 0,200": "fisher/provox: the target's pv_range is given, the source's is not; give both",
-    f"convert {_PI} {_TO} --pv-range 0,100 --to-pv-range 200,0": (
-        "emerson/deltav: pv_range: 200 to 0 is no range; give low, then high"
+    f"convert {_PI} {_TO} --to-pv-range 0,200": (
+        "fisher/provox: the target's PV range is 0 to 200, the source's is not given; give both, also where they agree"
     ),
 }
 
@@ -141,10 +143,13 @@ USAGE = {
         "no CARD to convert from; for example: pidemu convert fisher/provox GAIN=2 RESET=4 --to emerson/deltav",
     ),
     f"convert {_PI}": ("convert", "no card to convert to; add --to CARD, 'pidemu cards' lists them"),
-    f"convert {_PI} {_TO} --pv-range 5": ("convert", "Invalid value for '--pv-range': '5' is not two numbers such as 0,200"),
-    f"convert {_PI} {_TO} --op-range low,high": (
+    f"convert {_PI} {_TO} --pv-range 5": ("convert", f"Invalid value for '--pv-range': '5' {_RANGE}"),
+    f"convert {_PI} {_TO} --op-range low,high": ("convert", f"Invalid value for '--op-range': 'low,high' {_RANGE}"),
+    f"convert {_PI} {_TO} --pv-range 200,0": ("convert", f"Invalid value for '--pv-range': 200 to 0 {_ENDS}"),
+    f"convert {_PI} {_TO} --pv-range 0,inf": ("convert", f"Invalid value for '--pv-range': 0 to inf {_ENDS}"),
+    f"convert {_PI} {_TO} --pv-range 0,100 --to-pv-range 200,0": (
         "convert",
-        "Invalid value for '--op-range': 'low,high' is not two numbers such as 0,200",
+        f"Invalid value for '--to-pv-range': 200 to 0 {_ENDS}",
     ),
     f"convert {_PI} {_TO} --match best": (
         "convert",

@@ -44,6 +44,13 @@ def continuous(settings: Settings, w: Floats, *, setpoint: bool = False) -> Comp
 
     Written out term by term as block diagrams are drawn, not as the quotient of polynomials that pidemu uses.
     """
+    signal = settings.equation.setpoint if setpoint else settings.equation.measurement
+    lag = signal.filter.time if signal is not None and signal.filter is not None else None
+    Tf = settings[lag].canonical if isinstance(lag, str) else 0.0
+    return np.asarray(_behind_the_filters(settings, w, setpoint) / (1 + 1j * w * Tf))
+
+
+def _behind_the_filters(settings: Settings, w: Floats, setpoint: bool) -> Complex:
     s = 1j * w
     a = settings.algorithm()
     assert a.filter_on == "term"

@@ -35,7 +35,7 @@ CONVERSIONS: dict[str, tuple[str, ...]] = {
     "infinite figures": ("generic/standard", "K=2", "Ti=inf", "Td=1", "--to", "emerson/deltav"),
     "nearest settings": ("generic/standard", "K=2", "Ti=10", "Td=4", "--to", "fisher/provox", "--allow-approximate"),
     "assumed": ("honeywell/tdc3000", "K=2", "T1=1", "T2=0.1", "--to", "emerson/deltav", "--assume"),
-    "ranges": ("generic/standard", "K=2", "Ti=10", "--pv-range", "0,100", "--to", "generic/series", "--to-pv-range", "0,200"),
+    "ranges": ("generic/standard", "K=2", "Ti=10", "--pv-range", "0,100 bar", "--to", "generic/series", "--to-pv-range", "0,200 bar"),
     "executed at another interval": (
         "generic/standard", "K=2", "Ti=10", "--to", "emerson/deltav", "--scan", "0.2", "--runs-every", "0.1",
     ),
@@ -136,25 +136,28 @@ def test_date_and_versions_are_in_it() -> None:
 def test_a_card_has_the_same_version_whatever_its_line_ends_are(tmp_path: Path) -> None:
     text = Path(pidemu.load_card("generic/series").document.path).read_bytes()
     for name, written in (("unix", text), ("windows", text.replace(b"\n", b"\r\n"))):
-        (tmp_path / f"{name}.yaml").write_bytes(written)
-    digests = {pidemu.load_card(tmp_path / f"{name}.yaml").digest for name in ("unix", "windows")}
+        (tmp_path / "generic").mkdir(exist_ok=True)
+        (tmp_path / "generic" / f"{name}.yaml").write_bytes(written)
+    digests = {pidemu.load_card(tmp_path / "generic" / f"{name}.yaml").digest for name in ("unix", "windows")}
     assert digests == {hashlib.sha256(text).hexdigest()}
 
 
 def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
-    source = pidemu.load_card("generic/standard").settings(K=2, Ti="0.5 min", pv_range=(0, 100), op_range=(0, 50))
+    source = pidemu.load_card("generic/standard").settings(
+        K=2, Ti="0.5 min", pv_range=(0, 100, "degC"), op_range="0,50 V = 0..100 %"
+    )
     asked: dict[str, Any] = {
         "options": {"FORM": "Standard"}, "given": {"ALPHA": 0.2}, "scan": (0.2, 0.5), "runs_every": (0.02, 0.5), "mode": "auto",
-        "action": "direct", "to_pv_range": (0, 200), "to_op_range": (0, 50), "match": "low-frequency",
+        "action": "direct", "to_pv_range": "0,200 degC", "to_op_range": "0,50 V = 0,100 %", "match": "low-frequency",
         "process": Process.from_lags(0.8, lags=[20.0], delay=3), "compensate": True, "digits": 4, "allow_approximate": True,
-        "assume": True, "tag": "TIC-101",
+        "assume": True, "tag": "TIC-101", "bias": 40.0,
     }  # fmt: skip
     request = pidemu.convert(source, "emerson/deltav", emulate=False, **asked).to_dict()["request"]
     assert request == {
         "from": {
-            "card": "generic/standard", "settings": {"K": 2.0, "Ti": "0.5 min"}, "options": {}, "pv_range": "0,100",
-            "op_range": "0,50",
+            "card": "generic/standard", "settings": {"K": 2.0, "Ti": "0.5 min"}, "options": {}, "pv_range": "0,100 degC",
+            "op_range": "0,50 V = 0,100 %", "lag_on_pv": 0.0,
         },
-        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5], "to_pv_range": "0,200",
-        "to_op_range": "0,50", "process": "gain=0.8,lag=20,delay=3",
+        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5],
+        "process": "gain=0.8,lag=20,delay=3",
     }  # fmt: skip

@@ -64,7 +64,7 @@ EXACT = [
     Pair("emerson/deltav", {"GAIN": 2, "RESET": 30, "STRUCTURE": "5"}, "generic/parallel"),
     Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.25}, "generic/series"),
     Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.25, "CTEQN": "B"}, "generic/parallel"),
-    Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "CTEQN": "C"}, "generic/standard"),
+    Pair("king/velocity", {"Kc": 2, "Ti": 1, "EQUATION": "8"}, "generic/standard"),
     Pair("foxboro/pneumatic", {"PB": 50, "INT": 1, "DERIV": 0.25}, "honeywell/tdc3000"),
     Pair("honeywell/udc", {**UDC, "ALGO": "B"}, "generic/parallel"),
     Pair("honeywell/udc", UDC, "generic/series"),
@@ -80,7 +80,7 @@ EXACT = [
         options={"proportional_on_measurement": "true"},
     ),
     Pair("simple-pid/simple-pid", {"Kp": 2, "Ki": 0.1, "Kd": 3, "differential_on_measurement": "false"}, "generic/standard"),
-    Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODE": "PI"}, "fisher/provox"),
+    Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODOPT": "PI"}, "fisher/provox"),
 ]
 
 FEEDBACK = [

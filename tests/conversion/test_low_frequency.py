@@ -121,6 +121,7 @@ def test_the_moments_of_every_card_are_those_of_the_table(card: str, data: st.Da
     s = settings_that_act(data, pidemu.load_card(card))
     assume(s.equation.proportional.on != "none")
     assume(not (s.equation.form == "series" and s.algorithm().filter_on != "term" and s.equation.integral.on == "none"))
+    assume(s.algorithm().pv_filter is None)  # the table has no filter on the measurement beside the derivative's
     expected, found = moments(s), s.law().moments()
     sizes = scale(expected)
     for a, b, size in zip(expected, found, sizes, strict=True):
@@ -215,7 +216,9 @@ def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_a_sine(
     discrete = complex(conversion.settings.law(scan).response(w) / source.law(scan).response(w))
     assert shown == pytest.approx(discrete, abs=1e-6)  # least squares on doubles; the transients are gone after nine periods
     # the rules put s (1 - s h/2) for s, a relative error of w h/2: so much, and no more than twice it, of the deviation itself
-    error = band.max_deviation * w * scan
+    # where only one integral is trapezoidal, the backward one's w h/2 is not in both
+    rules = {s.equation.integral.rule for s in (source, conversion.settings)}
+    error = (band.max_deviation + (0.5 if len(rules) > 1 else 0.0)) * w * scan
     assert abs(shown - 1) == pytest.approx(band.max_deviation, abs=error)
     assert abs(math.log(abs(shown))) <= band.gain_db * math.log(10) / 20 + error
     assert abs(math.atan2(shown.imag, shown.real)) <= math.radians(band.phase_deg) + error

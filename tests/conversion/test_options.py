@@ -80,10 +80,10 @@ def test_weights_above_one_are_kept() -> None:
 def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -> None:
     source = pidemu.load_card("emerson/deltav").settings(GAIN=2, STRUCTURE="4")
     conversion = pidemu.convert(source, "foxboro/ia-pid")
-    assert dict(conversion.chosen) == {"MODE": "P"}
+    assert dict(conversion.chosen) == {"MODOPT": "P"}
     assert conversion.verdict == "exact"
     with pytest.raises(ConversionRefusedError, match="cannot do"):
-        pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "PID"})
+        pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "PID"})
 
 
 def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
@@ -101,7 +101,7 @@ def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
 def test_options_that_the_user_chose_are_kept() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
     conversion = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": "1"})
-    assert conversion.settings.options == {"FORM": "Standard", "STRUCTURE": "1"}
+    assert conversion.settings.options == {"FORM": "Standard", "STRUCTURE": "1", "FRSIPID_OPTS": "none"}
     assert dict(conversion.chosen) == {}
     assert conversion.verdict == "exact-feedback"
 
@@ -116,7 +116,7 @@ def test_the_defaults_stay_where_no_choice_does_better() -> None:
 def test_every_choice_is_ranked_on_request_and_no_later_one_has_a_better_verdict() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
     ranking = pidemu.convert(source, "emerson/deltav", all_options=True).ranking
-    assert len(ranking) == 16  # two forms, eight structures
+    assert len(ranking) == 32  # two forms, eight structures, with and without nonlinear gain
     order = ["exact", "exact-feedback", "approximate", "refused"]
     places = [order.index(a.verdict) for a in ranking]
     assert places == sorted(places)
@@ -170,7 +170,9 @@ def test_a_card_in_engineering_units_takes_the_ranges() -> None:
 
 def test_without_ranges_a_card_in_engineering_units_says_what_is_taken() -> None:
     source = pidemu.load_card("bailey/fc19").settings(KP=2, KI=0.5)
-    assert any("spans not given are taken as 100" in w for w in pidemu.convert(source, "emerson/deltav").warnings)
+    found = pidemu.convert(source, "emerson/deltav").warnings[:2]
+    assert [w.partition(",")[0] for w in found] == ["the PV range is not given", "the output range is not given"]
+    assert all(w.endswith("0 to 100 is taken") for w in found)
 
 
 @pytest.mark.parametrize("value", ["2 eu/eu", "50 eu", "2 %/eu"])
@@ -223,9 +225,14 @@ def test_rounding_keeps_notes_and_never_makes_an_infinite_gain(tmp_path: Path) -
     assert conversion.source.notes == ("Ti: 1 min is 60 s",)
 
 
-@pytest.mark.parametrize("limits", ["[0, 10]", "[0, 1e-6]", "[1e6, 1e7]"])
-def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, limits: str) -> None:
-    text = edited(VALID, ('GAIN: {sets: gain, unit: "%/%"}', f'GAIN: {{sets: gain, unit: "%/%", range: {limits}}}'))
+@pytest.mark.parametrize(("limits", "inside"), [("[0, 10]", 5.0), ("[0, 1e-6]", 1e-6), ("[1e6, 1e7]", 1e6)])
+def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, limits: str, inside: float) -> None:
+    text = edited(
+        VALID,
+        ('GAIN: {sets: gain, unit: "%/%"}', f'GAIN: {{sets: gain, unit: "%/%", range: {limits}}}'),
+        ("GAIN: 2,", f"GAIN: {inside},"),
+        ("kp: 2, ki: 0.0333333, kd: 32", f"kp: {inside}, ki: {inside / 60:.6g}, kd: {inside * 16:.6g}"),
+    )
     target = pidemu.load_card(written(tmp_path, text))
     source = pidemu.load_card("generic/standard").settings(K=20000, Ti=10, Td=1)
     with pytest.raises(PidemuError, match="outside"):

@@ -82,7 +82,7 @@ SHAPE = [
     ),
     Refusal("no integral", "fisher/provox", PROVOX, "emerson/deltav", "integral action", {"STRUCTURE": "3"}),
     Refusal("no integral with D on PV", "generic/standard", STANDARD, "emerson/deltav", "integral action", {"STRUCTURE": "4"}),
-    Refusal("no derivative", "generic/standard", STANDARD, "foxboro/ia-pid", "derivative action", {"MODE": "PI"}),
+    Refusal("no derivative", "generic/standard", STANDARD, "foxboro/ia-pid", "derivative action", {"MODOPT": "PI"}),
     Refusal("no proportional", "generic/standard", {"K": 2, "Ti": 60}, "emerson/deltav", "proportional action", {"STRUCTURE": "6"}),
 ]
 
@@ -279,8 +279,15 @@ def test_integral_action_alone_goes_to_cards_that_can_be_without_proportional_ac
         conversion = pidemu.convert(source, "emerson/deltav", options=options)
         assert conversion.verdict == "exact"
         assert conversion.settings.law().moments()[0] == pytest.approx(0.1)
-    assert pidemu.convert(source, "honeywell/tdc3000", options={"CTEQN": "D"}).verdict == "exact"
-    assert pidemu.convert(source, "foxboro/ia-pid", options={"MODE": "I"}).verdict == "exact"
+    tdc = pidemu.convert(source, "honeywell/tdc3000", options={"CTEQN": "D"}, emulate=False)  # its scan rule is another
+    assert tdc.verdict == "exact"
+    assert pidemu.convert(source, "foxboro/ia-pid", options={"MODOPT": "I"}).verdict == "exact"
+
+
+def test_integral_alone_behind_a_measurement_filter_is_refused_by_a_series_form_and_does_not_crash() -> None:
+    source = pidemu.load_card("emerson/deltav").settings(GAIN=1, RESET=1, STRUCTURE="5", PV_FTIME=1)
+    with pytest.raises(ConversionRefusedError, match="the source has no proportional action"):
+        pidemu.convert(source, "honeywell/tdc3000", options={"FORM": "interactive"}, match="low-frequency", emulate=False)
 
 
 def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:
@@ -304,7 +311,7 @@ def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:
         ({"given": {"ALPHB": 0.1}}, "unknown setting 'ALPHB' (did you mean 'ALPHA'?)"),
         ({"given": {"ALPHA": 2}}, "outside 0.05 to 1"),
         ({"options": {"FORM": "Serie"}}, "did you mean 'Series'?"),
-        ({"pv_range": (0, 200)}, "the target's pv_range is given, the source's is not; give both"),
+        ({"to_pv_range": (0, 200)}, "the target's PV range is 0 to 200, the source's is not given; give both"),
     ],
 )
 def test_wrong_wishes_are_errors_and_no_refusals(arguments: dict[str, object], message: str) -> None:

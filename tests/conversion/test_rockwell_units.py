@@ -99,6 +99,8 @@ def test_dependent_gains_of_the_pid_to_independent_ones_of_the_pide_are_per_minu
         (pid(KP=2, KI=0.05, KD=12, DOE="error", NDF="on"), PIDE, {"PVEDerivative": "false"}),
         (pid(KP=2, KI=0.5, KD=0.1, PE="dependent"), PIDE, {"DependIndepend": "true", "DSmoothing": "true"}),
         (pid(KP=2, KI=0.5, KD=0.1, PE="dependent", NDF="on"), PID, {"PE": "independent", "NDF": "on"}),
+        (pid(KP=20, KI=0.5, KD=60), PID, {"PE": "dependent", "NDF": "off"}),
+        (pid(KP=2, KI=0.5, KD=0.1, PE="dependent"), PIDE, {"DependIndepend": "false", "DSmoothing": "true"}),
         (pide(PGain=2, IGain=3, DGain=0.2), PIDE, {"DependIndepend": "true"}),
         (pide(DependIndepend="true", PGain=2, IGain=0.5, DGain=0.1), PID, {"NDF": "on"}),
         (pide(PGain=2, IGain=3, DGain=0.2, PVEProportional="true"), PIDE, {"DependIndepend": "true", "PVEProportional": "true"}),
@@ -133,6 +135,16 @@ def test_the_reset_of_the_pide_is_not_seconds_per_repeat() -> None:
     wanted = outputs(source, sp, pv, 1.0)
     assert difference(outputs(conversion.settings, sp, pv, 1.0), wanted) < ROUNDING
     assert difference(outputs(wrong, sp, pv, 1.0), wanted) > 0.1
+
+
+@pytest.mark.parametrize("KP", [0.1, 1.0, 20.0])
+def test_both_equations_of_one_block_smooth_the_derivative_with_the_same_time(KP: float) -> None:
+    independent = [pid(KP=KP, KI=0.05, KD=12 * KP), pide(PGain=KP, IGain=3, DGain=0.2 * KP, DSmoothing="true")]
+    dependent = [
+        pid(PE="dependent", KP=KP, KI=1, KD=0.2),
+        pide(DependIndepend="true", PGain=KP, IGain=1, DGain=0.2, DSmoothing="true"),
+    ]
+    assert [s.algorithm().Tf for s in (*independent, *dependent)] == pytest.approx([0.75] * 4, rel=1e-12)  # 12 s/16
 
 
 @pytest.mark.parametrize(("PE", "DependIndepend"), FORMS)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.conversion import verify as module
 from pidemu.errors import CertificateError, PidemuError
-from tests.cli.helpers import said, strict_json
+from tests.cli.helpers import said, strict_json, with_another_filter
 from tests.conversion.test_document import CONVERSIONS, OTHERS
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--scan", "1,0.5")
@@ -41,12 +41,6 @@ def own(tmp_path: Path) -> Path:
         (tmp_path / file.parent.name).mkdir()
         shutil.copy(file, tmp_path / file.parent.name)
     return tmp_path
-
-
-def changed(file: Path, old: str, new: str) -> None:
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", CONVERSIONS)
@@ -125,7 +119,7 @@ def test_a_card_that_changed_the_result_is_named(own: Path) -> None:
     """PROVOX with another filter ratio: RATE and ALPHA are others, and it is PROVOX's card that is another version."""
     plain = signed()
     file = own / "fisher" / "provox.yaml"
-    changed(file, "ratio: 0.125", "ratio: 0.1")
+    file.write_text(with_another_filter(file.read_text(encoding="utf-8")), encoding="utf-8")
     found = pidemu.verify(plain, vendors=[own])
     assert {c.name: (c.before, c.after) for c in found.changes if c.kind == "dial"} == {
         "RATE": ("5.25 s", "5.4 s"),
@@ -172,7 +166,8 @@ def test_a_conversion_that_is_refused_or_asked_about_today_is_a_change() -> None
 
 def test_a_card_of_ones_own_is_found_in_its_folder(tmp_path: Path) -> None:
     (tmp_path / "acme").mkdir()
-    shutil.copy(pidemu.load_card("generic/series").document.path, tmp_path / "acme" / "block.yaml")
+    text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
+    (tmp_path / "acme" / "block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     card = pidemu.load_card("acme/block", vendors=[tmp_path])
     plain = pidemu.convert(card.settings(K=2, Ti=15, Td=5), "generic/standard").to_dict()
     assert pidemu.verify(plain, vendors=[tmp_path]).unchanged

@@ -120,6 +120,8 @@ def check_figures(result: FleetResult, expected: Sequence[Simulation], initial: 
         assert columns["at_low"][i] == pytest.approx(np.sum(one.output <= low) * one.scan, rel=rounding)
         assert columns["at_high"][i] == pytest.approx(np.sum(one.output >= high) * one.scan, rel=rounding)
         assert columns["error"][i] == one.error[-1]
+        last_fifth = one.error[-max(10, -(-one.times.size // 5)) :]
+        assert columns["swing"][i] == np.max(last_fifth) - np.min(last_fifth)
         assert (result.scan[i], result.scans[i]) == (one.scan, one.times.size)
 
 

@@ -69,7 +69,8 @@ def test_a_fleet_has_the_numbers_of_one_machine(given: str, cluster: Any, loops:
         found = Fleet(loops).simulate(**STEPS, keep=True, cluster=where)
         assert client.status == "running"
     check(found, here)
-    assert found.counts == {"done": len(loops) - 1, "failed": 1}
+    assert found.counts["failed"] == 1
+    assert (found.status, found.settled, found.stable) == (here.status, here.settled, here.stable)
     for loop in loops:
         if loop.tag != "fails":
             one, other = found[loop.tag], here[loop.tag]

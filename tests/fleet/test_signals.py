@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import csv
+import math
 import os
 import sys
 import tracemalloc
@@ -22,6 +23,7 @@ from pidemu import Fleet, FleetError, FleetResult, Loop, Simulation
 from pidemu.engines import Engine
 from pidemu.fleet import local
 from pidemu.fleet.blocks import COLUMNS
+from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.signals import INDEX, SignalStore
 from tests.fleet.support import EVERY_ENGINE, alike, alone, check_signals, few
 
@@ -173,7 +175,7 @@ def test_an_interrupted_fleet_leaves_an_index_of_what_is_done(tmp_path: Path, mo
 
     monkeypatch.setattr(FleetResult, "add", interrupted)
     result = Fleet(loops).simulate(folder=tmp_path / "f", parquet=tmp_path / "fleet.parquet", engine="python", cores=2)
-    done = {loop.tag for loop, status in zip(loops, result.status, strict=True) if status == "done"}
+    done = {loop.tag for loop, status in zip(loops, result.status, strict=True) if status in RAN}
     index = read_index(tmp_path / "f")
     assert result.interrupted
     assert 0 < len(done) < 200
@@ -192,12 +194,17 @@ def test_a_parquet_file_holds_figures_and_signals(kept: str, tmp_path: Path, eac
     folder = tmp_path / "f" if kept == "in a folder" else None
     result = Fleet(loops).simulate(**STEPS, parquet=path, folder=folder, keep=kept == "in memory")
     table = pq.read_table(path)
-    assert table.column_names == ["tag", "card", "scan", *COLUMNS, "output", "measurement"]
+    assert table.column_names == ["tag", "card", "status", "scan", *COLUMNS, "settled", "stable", *MARGINS, "output", "measurement"]
     places = [[loop.tag for loop in loops].index(tag) for tag in table["tag"].to_pylist()]
     assert sorted(places) == list(range(len(loops) - 1))
     assert table["card"].to_pylist() == [loops[i].settings.card.id for i in places]
     for name in COLUMNS:
         assert np.array_equal(table[name].to_numpy(), result.columns[name][places])
+    for name in MARGINS:
+        found = [math.nan if x is None else x for x in table[name].to_pylist()]
+        assert np.array_equal(found, result.columns[name][places], equal_nan=True)
+    for name, known in (("status", result.status), ("settled", result.settled), ("stable", result.stable)):
+        assert table[name].to_pylist() == [known[i] for i in places]
     for output, measurement, i in zip(lists(table, "output"), lists(table, "measurement"), places, strict=True):
         assert np.array_equal(output, each[i].output)
         assert np.array_equal(measurement, each[i].measurement)

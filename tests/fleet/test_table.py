@@ -11,6 +11,7 @@ import pidemu
 from pidemu.errors import CardNotFoundError, FleetError
 from pidemu.fleet.result import HEADER
 from pidemu.fleet.table import LoopTable, read_loops
+from pidemu.ranges import SignalRange
 from tests.checks.bench import VALID, edited, written
 
 HEAD = "tag,card,settings,process,scan,action,limits,setpoint,load,time"
@@ -67,7 +68,7 @@ def test_columns_stand_in_any_order_and_case_with_blanks_around(tmp_path: Path) 
 
 def test_signal_ranges_stand_among_the_settings(tmp_path: Path) -> None:
     (loop,) = read(tmp_path, 'A,bailey/fc19,"KP=2; pv_range=0,200",gain=1,,,,,,').loops
-    assert loop.settings.pv_range == (0, 200)
+    assert loop.settings.pv_range == SignalRange(0, 200)
 
 
 def test_lines_are_counted_as_an_editor_counts_them(tmp_path: Path) -> None:
@@ -95,7 +96,7 @@ WRONG = {
     ),
     "A,generic/standard,K=2; K=3,gain=1,,,,,,": "K is given twice, 2 and 3; give it once",
     "A,generic/standard,K 2,gain=1,,,,,,": "'K 2' is not NAME=VALUE; write for example GAIN=2 or \"RESET=20 s/repeat\"",
-    "A,bailey/fc19,pv_range=5,gain=1,,,,,,": "'5' is not two numbers such as 0,200",
+    "A,bailey/fc19,pv_range=5,gain=1,,,,,,": ("'5' is not a range; write low and high with a unit, such as \"0,400 degC\""),
     "A,generic/standard,K=2; Ti=10,lag=3,,,,,,": "'lag=3' has no gain; add gain=1.5, for example",
     "A,generic/standard,K=2; Ti=10,gain=1,fast,,,,,": (
         "scan: 'fast' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"

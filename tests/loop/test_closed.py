@@ -63,8 +63,7 @@ def in_turns(made: Trial) -> tuple[Floats, Floats]:
     controller, plant = made.controller(), Plant(made.process.sampled(made.scan))
     settings = made.settings
     own = settings.equation.signals == "engineering"
-    low, high = (own and settings.pv_range) or (0.0, 100.0)
-    bottom, top = (own and settings.op_range) or (0.0, 100.0)
+    (low, high), (bottom, top) = (r.ends if own and r is not None else (0.0, 100.0) for r in (settings.pv_range, settings.op_range))
     _, rest_pv, rest_output = made.initial
     out, pv = [], []
     for sp, load in zip(made.setpoint.tolist(), made.load.tolist(), strict=True):

@@ -149,7 +149,12 @@ def test_the_csv_holds_every_cell_with_its_figures(four: Matrix) -> None:
 
 
 def test_a_target_that_refuses_shows_its_nearest_settings(tmp_path: Path) -> None:
-    text = edited(VALID, ('GAIN: {sets: gain, unit: "%/%"}', 'GAIN: {sets: gain, unit: "%/%", range: [3, 9]}'))
+    text = edited(
+        VALID,
+        ('GAIN: {sets: gain, unit: "%/%"}', 'GAIN: {sets: gain, unit: "%/%", range: [3, 9]}'),
+        ("GAIN: 2,", "GAIN: 4,"),
+        ("kp: 2, ki: 0.0333333, kd: 32", "kp: 4, ki: 0.0666667, kd: 64"),
+    )
     cell = matrix(["generic/standard", written(tmp_path, text)], emulate=False).row("generic/standard")[1]
     assert (cell.verdict, cell.mark) == ("refused", "x")
     assert "GAIN" in cell.sentence
@@ -217,3 +222,14 @@ def test_an_interrupt_ends_all_processes_without_a_traceback(tmp_path: Path) -> 
     out, err = process.communicate(timeout=60)
     assert out.splitlines()[-1] == "ended"
     assert (process.returncode, err) == (0, "")
+
+
+def test_typical_times_of_a_card_that_counts_in_scans_are_those_seconds(tmp_path: Path) -> None:
+    text = edited(
+        VALID,
+        ("integral, unit: s,", "integral, unit: scan,"),
+        ("scan: {default: 1 s}", "scan: {default: 0.5 s}"),
+        ("RESET: 60", "RESET: 120"),
+    )
+    settings = typical_settings(pidemu.load_card(written(tmp_path, text)))
+    assert settings["RESET"].value == 180  # 90 s

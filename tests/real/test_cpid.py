@@ -36,7 +36,7 @@ class Cpid:
         self.size = 0.0
 
     def scan(self, sp: float, pv: float, auto: bool, manual: float, dt: float) -> float:
-        most = self.rRampMax * dt
+        most = self.rRampMax  # per sample: dt has no part in it
         self.setpoint += min(max(sp - self.setpoint, -most), most)
         r = self.setpoint
         integrand = self.Ki * (r - pv)
@@ -110,9 +110,24 @@ def test_any_settings_and_manual_spells_agree_with_the_documented_computation(
     assert close(ctl.run(record.sp, record.pv, record.auto, record.manual), expected, TOLERANCE, oracle.size)
 
 
-def test_the_setpoint_ramp_begins_at_zero() -> None:
-    found = controller(0.5, (-math.inf, math.inf), Kp=1.0, rRampMax=10.0).run(50.0, np.zeros(4))
-    assert found.tolist() == [5.0, 10.0, 15.0, 20.0]
+@pytest.mark.parametrize("scan", [0.1, 0.5, 2.0])
+def test_the_setpoint_ramp_begins_at_zero_and_counts_samples_not_seconds(scan: float) -> None:
+    found = controller(scan, (-math.inf, math.inf), Kp=1.0, rRampMax=10.0).run(50.0, np.zeros(4))
+    assert found == pytest.approx([10.0, 20.0, 30.0, 40.0], rel=TOLERANCE)  # rate times interval rounds twice
+
+
+def test_the_ramp_is_that_of_the_authors_own_test() -> None:
+    """PIDSetpointRamp of mxPID_tests.m at commit 12cb31e0: Ts = 0.1, rRampMax = 0.3 gives setpoints of 0.3, 0.6, 0.9."""
+    found = controller(0.1, (-math.inf, math.inf), Kp=1.0, rRampMax=0.3).run(1.0, np.zeros(4))
+    assert found == pytest.approx([0.3, 0.6, 0.9, 1.0], rel=TOLERANCE)
+
+
+def test_the_ramp_is_per_sample_where_intervals_are_stated_later() -> None:
+    s = pidemu.load_card("gnc-tools/cpid").settings(Kp=1.0, rRampMax=2.0)
+    assert s.algorithm().sp_rate == 20.0  # the card's interval is 0.1 s
+    assert s.algorithm(scan=0.5).sp_rate == 4.0
+    assert s.at_scan(0.25)["rRampMax"].to("eu/s") == 8.0
+    assert s.at_scan(0.25).algorithm().sp_rate == 8.0
 
 
 def test_the_first_scan_kicks_when_there_is_a_derivative() -> None:

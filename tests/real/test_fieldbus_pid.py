@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import pytest
@@ -25,9 +25,11 @@ class Dials:
     RESET: float
     RATE: float
     PV_FTIME: float = 0.0
+    SP_RATE_UP: float = np.inf
+    SP_RATE_DN: float = np.inf
 
     def card(self) -> pidemu.Settings:
-        values = {name: getattr(self, name) for name in ("GAIN", "RESET", "RATE", "PV_FTIME")}
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
         return pidemu.load_card("yokogawa/fieldbus-pid").settings(values)
 
 
@@ -43,12 +45,17 @@ class Block:
     OUT: float
     history: list[tuple[float, float]] = field(default_factory=list)  # PV and the setpoint in force, newest last
     automatic: bool = False
+    SP: float = np.nan
     size: float = field(default=1.0)
 
     def scan(self, SP: float, IN: float, auto: bool, manual: float, CAS_IN: float, BKCAL_IN: float = np.nan) -> float:
         d, dT = self.d, self.dT
         cascade = auto and not np.isnan(CAS_IN)
-        SP = CAS_IN if cascade else SP
+        if cascade:
+            SP = CAS_IN
+        elif not np.isnan(self.SP):  # in each execution period, whatever its length
+            SP = min(max(SP, self.SP - d.SP_RATE_DN), self.SP + d.SP_RATE_UP)
+        self.SP = SP
         PV = IN if not self.history else (d.PV_FTIME * self.history[-1][0] + dT * IN) / (d.PV_FTIME + dT)
         self.history = [*(self.history or [(PV, SP)] * 2), (PV, SP)][-3:]
         (PV2, _), (PV1, SP1), _ = self.history
@@ -101,6 +108,8 @@ dials = st.builds(
     RESET=st.floats(0.5, 1000) | st.floats(0.1, 10000),
     RATE=st.just(0.0) | st.floats(0.1, 60),
     PV_FTIME=st.just(0.0) | st.floats(0.1, 20),
+    SP_RATE_UP=st.just(np.inf) | st.floats(0.05, 20),
+    SP_RATE_DN=st.just(np.inf) | st.floats(0.05, 20),
 )
 
 
@@ -209,3 +218,14 @@ def test_the_load_is_answered_alike_in_both_modes() -> None:
     d = Dials(GAIN=1.5, RESET=30.0, RATE=4.0)
     auto, cascade = (pidemu.Controller(d.card(), scan=1.0, output_limits=(-1e6, 1e6)) for _ in range(2))
     assert close(cascade.run(50.0, pv, cascade=50.0), auto.run(50.0, pv), TOLERANCE, 1e5)
+
+
+@pytest.mark.parametrize("dT", [0.25, 1.0, 4.0])
+def test_the_setpoint_rates_count_execution_periods_and_only_the_local_setpoint(dT: float) -> None:
+    d = Dials(GAIN=2.0, RESET=100.0, RATE=0.0, SP_RATE_UP=3.0, SP_RATE_DN=1.0)
+    sp = np.array([50.0, 60.0, 60.0, 50.0, 50.0])
+    out = pidemu.Controller(d.card(), scan=dT, initial_output=40.0).run(sp, 50.0)
+    assert np.diff(out) == pytest.approx(2.0 * dT / 100 * np.array([3.0, 6.0, 5.0, 4.0]), rel=1e-12)
+    ctl = pidemu.Controller(d.card(), scan=dT, initial_output=40.0)
+    remote_step = ctl.run(50.0, np.full(3, 50.0), cascade=[50.0, 60.0, 60.0])
+    assert np.diff(remote_step) == pytest.approx([2.0 * 10 + 0.2 * dT, 0.2 * dT], rel=1e-12)

@@ -154,3 +154,10 @@ def test_a_gain_between_two_steps_of_its_dial_is_refused() -> None:
 def test_a_scan_of_a_fraction_of_its_clock_is_refused() -> None:
     with pytest.raises(pidemu.ScanError, match="scan interval"):
         pidemu.Controller(Dials(100, 1000, 0).card(), scan=1 / 3)
+
+
+@pytest.mark.parametrize("scan", [0.5, 1.0])
+def test_the_limit_of_the_set_value_counts_control_intervals(scan: float) -> None:
+    s = pidemu.load_card("toshiba/pid3").settings(KP=2, TI=0, DSV=0.25)
+    out = pidemu.Controller(s, scan=scan, initial_output=40.0).run([50.0, 51.0, 51.0, 51.0, 51.0, 51.0], 50.0)
+    assert counts(out) == [4000, 4050, 4100, 4150, 4200, 4200]

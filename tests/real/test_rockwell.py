@@ -45,9 +45,9 @@ class Pid:
         return pidemu.load_card("allen-bradley/logix-pid").settings({**values, **{n: w[values[n]] for n, w in words.items()}})
 
     def gains(self) -> tuple[float, float, float, float]:
-        """Kp, Ki [1/s] and Kd [s] by the conversions of 1756-RM003, p. 520, and the time of the derivative dial [s]."""
+        """Kp, Ki [1/s] and Kd [s] by the conversions of 1756-RM003, p. 520, and the derivative time [s]."""
         if not self.PE:
-            return self.KP, self.KI, self.KD, self.KD
+            return self.KP, self.KI, self.KD, self.KD / self.KP
         return self.KP, self.KP / (60 * self.KI) if self.KI else 0.0, 60 * self.KP * self.KD, 60 * self.KD
 
 
@@ -142,7 +142,7 @@ class PideBlock:
         (_, d2), (p1, d1), (p0, d0) = self.history
         dP, dI, dD = Kp * (p0 - p1), KI * E * dt, KD / dt * (d0 - 2 * d1 + d2)
         if d.DSmoothing:
-            Tf = SMOOTHING * 60 * d.DGain
+            Tf = SMOOTHING * KD / Kp
             D = (Tf * self.D + KD * (d0 - d1)) / (Tf + dt)
             self.D, dD = D, D - self.D
         last = self.CV

@@ -38,6 +38,8 @@ def test_the_segments_follow_each_other_from_start_to_end() -> None:
         "manual",
         "return to automatic",
         "setpoint step again",
+        "into a limit, with noise",
+        "back from it, with noise",
     ]
     starts, ends = [s.start for s in RECORD.segments], [s.end for s in RECORD.segments]
     assert [0.0, *ends[:-1]] == starts
@@ -84,7 +86,7 @@ def test_the_noise_is_bounded_varied_and_that_of_its_seed() -> None:
     assert noise[:3] == pytest.approx([4 * (x - 0.5) for x in drawn], abs=1e-12)
     other = standard_record(1.0, seed=2, time=40.0, size=4.0)
     differs = np.flatnonzero(other.pv != RECORD.pv)
-    assert (differs.min(), differs.max()) == (520, 599)  # 13 to 15 times 40 s
+    assert set(np.unique(differs // 40)) == {13, 14, 28, 29, 30, 31, 32, 33}  # the parts with noise, in times of 40 s
     np.testing.assert_array_equal(other.sp, RECORD.sp)
 
 
@@ -95,6 +97,23 @@ def test_the_large_errors_are_eight_sizes_as_far_as_the_range_allows() -> None:
     assert {a - b for a, b in zip(sp, pv, strict=True)} == {-32.0}
     wide = standard_record(1.0, time=40.0, size=20.0)
     assert (wide.sp.min(), wide.sp.max()) == (5, 95)
+
+
+def test_the_last_parts_lead_into_a_limit_and_back_with_noise() -> None:
+    sp, pv, auto = part(RECORD, "into a limit, with noise")
+    assert (set(sp), set(auto)) == ({50.0}, {1.0})
+    ramp = [min(n / 40, 1.0) for n in range(120)]
+    noise = np.array(pv) - 50 - 32 * np.array(ramp)
+    # random.Random(1).random() gives 0.134, 0.847, 0.764, 0.255, 0.495, 0.449; a quarter of the noise without limits
+    drawn = [0.13436424411240122, 0.763774618976614, 0.4494910647887381]
+    assert noise[:3] == pytest.approx([x - 0.5 for x in drawn], abs=1e-6)
+    assert np.abs(noise).max() <= 0.5 + 1e-9
+    _, pv, _ = part(RECORD, "back from it, with noise")
+    rest = np.array(pv) - 50 - 32 * np.array([max(1 - n / 40, 0.0) for n in range(120)])
+    assert np.abs(rest).max() <= 0.5 + 1e-9
+    assert np.unique(rest.round(9)).size > 100
+    wide = standard_record(1.0, time=40.0, size=20.0)
+    assert part(wide, "into a limit, with noise")[1][60] == pytest.approx(95, abs=2.5)
 
 
 def test_in_manual_the_operator_moves_the_output_and_the_measurement_stays_off() -> None:

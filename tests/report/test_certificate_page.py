@@ -259,6 +259,13 @@ def test_the_page_has_the_order_and_the_words_of_the_terminal() -> None:
     assert [printed.index(f" {t} ") for t in titles] == sorted(printed.index(f" {t} ") for t in titles)
 
 
+def test_the_proof_is_on_the_page_where_there_is_one() -> None:
+    proof = tree(page("exact")).find(".//pre[@id='proof']")
+    assert proof is not None
+    assert (proof.text or "").strip().splitlines() == [line.rstrip() for line in (made("exact").proof or pytest.fail()).text]
+    assert 'id="proof"' not in page("arduino")
+
+
 def test_what_to_do_comes_before_the_figures() -> None:
     order = [words(h) for h in tree(page("arduino")).iter("h2")]
     assert order.index("After") < order.index("At the loop") < order.index("Cut-over") < order.index("Figures")
@@ -452,8 +459,8 @@ ASKED: dict[str, tuple[str, dict[str, object], str, dict[str, Any]]] = {
         "honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.1, "CTEQN": "B", "FORM": "ideal"}, "generic/standard", {},
     ),
     "ranges": (
-        "generic/standard", {**STANDARD, "pv_range": (-50, 150), "op_range": (0, 10)}, "arduino/pid",
-        {"to_pv_range": (0, 100), "to_op_range": (-5, 5), "allow_approximate": True},
+        "generic/standard", {**STANDARD, "pv_range": (-50, 150, "K"), "op_range": "0,10 V = 0..10 kg/h"}, "arduino/pid",
+        {"to_pv_range": (0, 100, "K"), "to_op_range": (-5, 5, "V"), "allow_approximate": True},
     ),
     "a process with all there is": (
         "generic/standard", {"K": 0.5, "Ti": 40}, "emerson/deltav",
@@ -495,7 +502,7 @@ def test_the_command_gives_what_was_asked_for_beside_the_settings(name: str) -> 
 def test_a_card_in_a_file_is_named_by_its_file(folder: Path) -> None:
     (folder / "acme").mkdir()
     text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
-    (folder / "acme" / "own block.yaml").write_text(text, encoding="utf-8")
+    (folder / "acme" / "own block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     c = convert(pidemu.load_card("acme/own block.yaml").settings(SERIES), "generic/standard", digits=5)
     command = command_for(c)
     assert command.startswith("pidemu convert 'acme/own block.yaml' K=2 ")
@@ -579,8 +586,8 @@ def test_the_textbook_settings_are_a_third_line_only_where_they_are_others() -> 
 
 def test_with_other_ranges_the_source_is_shown_in_the_targets_percent() -> None:
     """An exact conversion to a range twice as wide: in the target's percent both curves are one."""
-    source = pidemu.load_card("generic/series").settings({**SERIES, "pv_range": (0, 100)})
-    c = convert(source, "generic/standard", to_pv_range=(0, 200), process=PROCESS)
+    source = pidemu.load_card("generic/series").settings({**SERIES, "pv_range": (0, 100, "bar")})
+    c = convert(source, "generic/standard", to_pv_range=(0, 200, "bar"), process=PROCESS)
     assert c.factor == 2
     r, loops = responses(c), closed_loops(c)
     assert r is not None

@@ -214,12 +214,25 @@ def test_an_operators_output_beyond_the_limits_is_brought_back_inside_at_once_ho
 
 
 def test_the_setpoint_moves_no_faster_than_its_rate_and_starts_where_it_is() -> None:
-    a = replace(P, sp_rate=4.0)
+    a = replace(P, sp_rate=4.0, sp_rate_down=4.0)
     assert run(a, [10, 10, 15, 15, 15, 14], h=0.5) == [10, 10, 12, 14, 15, 14]
 
 
+@pytest.mark.parametrize(
+    ("rates", "expected"),
+    [
+        ((4.0, 2.0), [10, 12, 14, 13, 12, 11]),
+        ((4.0, math.inf), [10, 12, 14, 0, 0, 0]),
+        ((math.inf, 2.0), [10, 15, 15, 14, 13, 12]),
+    ],
+)
+def test_the_setpoint_may_rise_and_fall_at_different_rates(rates: tuple[float, float], expected: list[float]) -> None:
+    a = replace(P, sp_rate=rates[0], sp_rate_down=rates[1])
+    assert run(a, [10, 15, 15, 0, 0, 0], h=0.5) == expected
+
+
 def test_a_limited_setpoint_that_starts_at_zero_goes_up_from_there_in_the_first_scan() -> None:
-    a = replace(P, sp_rate=4.0, sp_from_zero=True)
+    a = replace(P, sp_rate=4.0, sp_rate_down=4.0, sp_from_zero=True)
     assert run(a, [5, 5, 5, 5, -5], h=0.5) == [2, 4, 5, 5, 3]
 
 

@@ -14,9 +14,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
-from pidemu.algorithm import Algorithm, Gate, Scheme
+import pidemu
+from pidemu.algorithm import Algorithm, Gate, Lag, Shape
 from pidemu.card.base import Rule
+from pidemu.card.load import variants
+from pidemu.checks.runs import plausible
+from pidemu.errors import UndefinedError
 from pidemu.scan.build import build
 from pidemu.scan.program import Program
 from pidemu.targets.python import compiled
@@ -104,16 +109,37 @@ def conditional_by_sign(x: Scan) -> tuple[float, float]:
     return clip(x.P + I + x.D), I
 
 
-def freeze_with_fast_return(x: Scan) -> tuple[float, float]:
-    stopped = (x.u == HIGH and x.dI > 0) or (x.u == LOW and x.dI < 0)
-    before = x.P + x.I + x.D
-    dI = x.dI
-    if before + dI > HIGH and dI < 0:
-        dI = max(16 * dI, HIGH - before)
-    elif before + dI < LOW and dI > 0:
-        dI = min(16 * dI, LOW - before)
-    I = x.I + (0.0 if stopped else dI)  # noqa: E741
+def conditional(x: Scan) -> tuple[float, float]:
+    """The increment counts for the output; of what leads beyond a limit the integral keeps what leads to it."""
+    v, I = x.P + (x.I + x.dI) + x.D, x.I + x.dI  # noqa: E741
+    if v > HIGH and x.dI > 0:
+        I -= min(x.dI, v - HIGH)  # noqa: E741
+    elif v < LOW and x.dI < 0:
+        I -= max(x.dI, v - LOW)  # noqa: E741
+    return clip(v), I
+
+
+def conditional_dropping(x: Scan) -> tuple[float, float]:
+    v = x.P + (x.I + x.dI) + x.D
+    stopped = (v > HIGH and x.dI > 0) or (v < LOW and x.dI < 0)
+    I = x.I if stopped else x.I + x.dI  # noqa: E741
     return clip(x.P + I + x.D), I
+
+
+def external_reset_with_fast_return(Ti: float) -> Callable[[Scan], tuple[float, float]]:
+    """``Ti F' = u - D - F`` with ``Ti/16`` on the way back from beyond 90 or 10 %, no farther than there in one scan."""
+
+    def step(x: Scan) -> tuple[float, float]:
+        before = x.P + x.I + x.D
+        plain, dI, time = clip(before + x.dI), x.dI, Ti
+        if plain > 90.0 and dI < 0:
+            dI, time = max(16 * dI, 90.0 - before), Ti / 16
+        elif plain < 10.0 and dI > 0:
+            dI, time = min(16 * dI, 10.0 - before), Ti / 16
+        v = before + dI
+        return clip(v), x.I + dI + H / (time + H) * (clip(v) - v)
+
+    return step
 
 
 def reset_outside_band(x: Scan) -> tuple[float, float]:
@@ -145,9 +171,12 @@ SCHEMES: dict[str, tuple[Callable[[], Callable[[Scan], tuple[float, float]]], di
     "freeze in both directions": (lambda: freeze_both, {"windup": "freeze", "gate": Gate(both=True)}),
     "freeze by the sum without derivative": (freeze_on_inner_sum, {"windup": "freeze", "gate": Gate(without_derivative=True)}),
     "conditional by error times output": (
-        lambda: conditional_by_sign, {"windup": "conditional", "gate": Gate(by_output_sign=True)},
+        lambda: conditional_by_sign, {"windup": "conditional", "gate": Gate(by_output_sign=True, drops=True)},
     ),
-    "fast return": (lambda: freeze_with_fast_return, {"windup": "freeze", "gate": Gate(fast_return=16.0)}),
+    "conditional": (lambda: conditional, {"windup": "conditional"}),
+    "conditional, the last increment dropped": (
+        lambda: conditional_dropping, {"windup": "conditional", "gate": Gate(drops=True)},
+    ),
     "reset outside the band": (lambda: reset_outside_band, {"windup": "reset-outside-band"}),
     "integral limits": (lambda: limits_of_its_own, {"integral_limits": (-15.0, 30.0)}),
     "integral limits, the lower one the output's": (lambda: lower_limit_of_the_output, {"integral_limits": (None, 30.0)}),
@@ -205,14 +234,148 @@ def test_with_an_external_signal_the_integral_is_its_lag_less_the_derivative(rul
         assert I == pytest.approx(F, rel=1e-9, abs=1e-9)  # terms of a thousand, rounded 120 times
 
 
-@pytest.mark.parametrize("scheme", ["freeze", "conditional", "external-reset"])
-def test_the_way_back_from_a_limit_is_sixteen_times_as_fast(scheme: Scheme) -> None:
-    """P on PV keeps the sum far beyond the limit while the error asks for less: all that moves is the integral."""
-    sp, pv = np.array([50.0, *[20.0] * 3]), np.array([50.0, *[30.0] * 3])
-    a = Algorithm(series=False, kp=10.0, ki=0.01, kd=0.0, b=0.0, windup=scheme, tracking_time=1e9)  # no cut-off is taken out
-    slow, fast = (np.diff(states_of(program(replace(a, gate=Gate(fast_return=f))), sp, pv, "I")[0]) for f in (1.0, 16.0))
-    assert slow == pytest.approx([-0.05] * 3, rel=1e-5)  # 0.01 times 0.5 s times an error of -10; 1e-7 of the cut-off are taken out
-    assert fast == pytest.approx([-0.8, -0.8, -0.8], rel=1e-5)
+FAST = Gate(fast_return=16.0, fast_beyond=(10.0, 90.0))
+
+
+@given(pid=pids, seed=seeds)
+def test_from_beyond_its_own_limits_the_integral_comes_back_sixteen_times_as_fast_as_by_hand(pid: Algorithm, seed: int) -> None:
+    a, (sp, pv) = replace(pid, windup="external-reset", gate=FAST), signals(seed, amplitude=60.0)
+    expected = loop(a, sp, pv, external_reset_with_fast_return(a.kp / a.ki))
+    scale = 16 * 120 * (a.kp + a.kd / H + a.ki * H * 120)  # sums in another order, as above
+    for one, other in zip(expected, states_of(program(a), sp, pv, "u", "I"), strict=True):
+        assert np.max(np.abs(one - other)) <= 1e-12 * scale
+
+
+def test_the_fast_return_ends_at_its_own_limit_and_never_begins_at_the_outputs() -> None:
+    """I alone, an error of -10: 0.05 % a scan, 0.8 % above 90 %. Limits at those of the output are never exceeded."""
+    sp, pv = np.array([60.0] * 2 + [40.0] * 40), np.full(42, 50.0)
+    a = Algorithm(series=False, kp=0.0, ki=0.01, kd=0.0, windup="external-reset", tracking_time=100.0)
+
+    def moves(beyond: tuple[float, float]) -> Floats:
+        gate = Gate(fast_return=16.0, fast_beyond=beyond)
+        return np.diff(outputs(build(replace(a, gate=gate), H, limits=(LOW, HIGH), initial_output=99.0), sp, pv))[1:]
+
+    assert moves((0.0, 100.0)) == pytest.approx([-0.05] * 40, abs=1e-12)
+    fast = moves((10.0, 90.0))
+    assert fast[:11] == pytest.approx([-0.8] * 11, abs=1e-12)  # 99.05 to 90.25
+    assert fast[11] == pytest.approx(-0.25, abs=1e-12)
+    assert fast[12:] == pytest.approx([-0.05] * 28, abs=1e-12)
+
+
+def test_deltavs_limits_of_the_windup_are_levels_of_its_output_and_do_nothing_unless_they_are_given() -> None:
+    card = pidemu.load_card("emerson/deltav")
+    for structure in ("1", "2", "5", "6", "7"):
+        plain = card.settings(GAIN=2, RESET=60, STRUCTURE=structure).algorithm()
+        assert (plain.windup, plain.gate) == ("external-reset", Gate())
+    given = card.settings(GAIN=2, RESET=60, ARW_HI_LIM=18, ARW_LO_LIM=5, op_range=(4, 20))
+    assert given.algorithm().gate == Gate(fast_return=16.0, fast_beyond=(6.25, 87.5))
+    assert given.algorithm().linear.gate == Gate()
+    assert given.algorithm().beyond_the_law == ["integral 16 times as fast on the way back from below 6.25 or above 87.5"]
+
+
+def test_deltavs_nonlinear_gain_is_a_gap_of_p_and_i_and_its_filters_are_off_unless_they_are_given() -> None:
+    card = pidemu.load_card("emerson/deltav")
+    plain = card.settings(GAIN=2, RESET=60).algorithm()
+    assert (plain.shape, plain.pv_filter, plain.sp_filter) == (None, None, None)
+    given = card.settings(GAIN=2, RESET=60, NL_GAP=3, NL_MINMOD=0.25, PV_FTIME=2, SP_FTIME=4)
+    assert given.options["FRSIPID_OPTS"] == "nonlinear gain"
+    a = given.algorithm()
+    assert (a.shape, a.pv_filter, a.sp_filter) == (Shape(kind="gap", band=3.0, gain=0.25), Lag(2.0), Lag(4.0))
+
+
+# --- external reset where P does not see the whole error ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("b", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("kp", [0.0, 2.0], ids=["I alone", "PI"])
+def test_positive_feedback_of_output_and_unseen_error_is_what_the_exact_solution_says(kp: float, b: float) -> None:
+    """``Ti F' = u + K (e - p) - F`` with ``u = clip(kp p + F)``, solved by SciPy's integrator; p is what P acts on.
+
+    The scan program's error is of first order in h: half a scan's integration and what the limits cut off at scans only.
+    """
+    Ti, K, h = 20.0, kp or 2.0, 0.002
+    t = np.arange(0.0, 120.0, h)
+    r = np.where(t < 60.0, 60.0, 45.0)
+    y = 50.0 - 4.0 * np.sin(t / 15.0)
+
+    def unseen(t: float) -> tuple[float, float]:
+        sp, pv = (60.0 if t < 60.0 else 45.0), 50.0 - 4.0 * math.sin(t / 15.0)
+        p = b * sp - pv if kp else 0.0
+        return p, sp - pv - p
+
+    def slope(t: float, F: Floats) -> Floats:
+        p, rest = unseen(t)
+        return np.asarray((np.clip(kp * p + F, LOW, HIGH) + K * rest - F) / Ti)
+
+    F0 = U0 - kp * unseen(0.0)[0]
+    exact: list[float] = []
+    for begin, end, start in ((0.0, 60.0, None), (60.0, 120.0, "before")):
+        at = t[(t >= begin) & (t < end)]
+        F = F0 if start is None else exact[-1]
+        exact.extend(solve_ivp(slope, (begin, end), [F], t_eval=at, rtol=1e-9, atol=1e-9, max_step=0.05).y[0])
+    expected = np.clip(kp * np.array([unseen(x)[0] for x in t]) + exact, LOW, HIGH)
+    a = Algorithm(series=False, kp=kp, ki=K / Ti, kd=0.0, b=b, windup="external-reset", tracking_time=Ti)
+    found = outputs(build(a, h, limits=(LOW, HIGH), initial_output=U0), r, y)
+    assert expected.max() == HIGH
+    assert expected.min() < HIGH
+    assert np.max(np.abs(found - expected)) <= 2 * h * K * 20 / Ti  # two scans of the largest error, 20 %
+
+
+@pytest.mark.parametrize("b", [0.0, 0.4, 1.0])
+def test_at_a_limit_the_sum_rests_the_gain_times_the_error_beyond_so_that_the_output_leaves_as_the_error_turns(b: float) -> None:
+    a = Algorithm(series=False, kp=2.0, ki=0.1, kd=0.0, b=b, windup="external-reset", tracking_time=20.0)
+    pv = np.concatenate([np.full(4000, 40.0), np.linspace(40.0, 60.0, 20_001)])  # the error turns very slowly, at 50 %
+    sp = np.full(pv.size, 50.0)
+    u, I = states_of(program(a), sp, pv, "u", "I")  # noqa: E741
+    p = b * sp - pv
+    rest = 2.0 * p[3999] + I[3999]  # after the cut, before the next increment
+    assert rest == pytest.approx(HIGH + 2.0 * 10.0, rel=1e-9)
+    left = int(np.argmax(u[4000:] < HIGH))  # the setpoint stands still, and with it K (e - p)
+    assert abs(left - 10_000) <= 1
+
+
+def test_integral_alone_leaves_the_limit_as_late_as_the_lag_of_what_rested_beyond_it() -> None:
+    """``v - 100`` goes from ``K e1`` towards ``K e2`` in Ti: it is 0 after ``Ti ln((e1 - e2)/-e2)``, 60 ln 9 = 131.8 s."""
+    a = Algorithm(series=False, kp=0.0, ki=3.0 / 60.0, kd=0.0, windup="external-reset", tracking_time=60.0)
+    sp, pv = np.full(5000, 60.0), np.array([20.0] * 4000 + [65.0] * 1000)
+    u = outputs(build(a, H, limits=(LOW, HIGH), initial_output=U0), sp, pv)
+    left = (int(np.argmax(u[4000:] < HIGH)) + 1) * H
+    assert left == pytest.approx(60.0 * math.log(9.0), abs=2 * H)  # the backward lag of 120 scans is half a scan late
+
+
+# --- a constant error brings the output to its limit -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("card_id", pidemu.cards())
+def test_under_a_constant_error_the_output_of_every_card_reaches_its_limit(card_id: str) -> None:
+    """No card stops short of it; one whose source says so would be an exception here, with that source."""
+    for variant in variants(pidemu.load_card(card_id)):
+        try:
+            settings = plausible(variant)
+            own_limits = {
+                n: 1000.0 if s.default is None else s.default
+                for n, s in variant.equation.settings.items()
+                if s.sets == "integral-limit"
+            }
+            settings = settings.changed(own_limits)  # which stop the integral before the output's limit, as they are meant to
+            a = settings.algorithm(own_units=True)
+        except UndefinedError:
+            continue
+        if not a.ki and a.dahlin is None:
+            continue
+        ends = [_ends(settings, error) for error in (-7.31, 7.31)]
+        assert sorted(ends) == [0.0, 100.0], variant.choice_text  # which is which, the sign of the gain decides
+
+
+def _ends(settings: pidemu.Settings, error: float) -> float:
+    """The output that a constant error leads to in four times what the integral alone would take."""
+    a = settings.algorithm(own_units=True)
+    controller = pidemu.Controller(settings, output_limits=(0.0, 100.0), initial_output=50.0)
+    scans = 400 if a.dahlin is not None else math.ceil(100.0 / abs(a.ki * controller.interval * error)) + 100
+    scans = max(scans, 500)  # a setpoint with a rate limit starts at zero
+    scans *= 20 if a.shape is not None and a.shape.kind == "squared" else 2  # 7 % of the error count then
+    controller.run(50.0, [50.0] * 3)
+    return float(controller.run(50.0 + error, [50.0] * scans)[-1])
 
 
 # --- tracking times and limits as cards state them -------------------------------------------------------------------

@@ -13,6 +13,7 @@ import pidemu
 from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible
 from pidemu.engines import ENGINES, Engine, block, has_numba
+from pidemu.ranges import PERCENT
 from pidemu.settings import Settings
 from pidemu.targets import native
 from pidemu.targets.python import compiled, starting
@@ -32,7 +33,7 @@ def settings_of(card_id: str) -> Settings:
 def record(settings: Settings, seed: int, *, bad: bool = True) -> dict[str, Floats]:
     """Setpoint steps, a measurement that drives the output to both limits and settles, manual and bad samples."""
     chance = np.random.default_rng((zlib.crc32(settings.card.id.encode()), seed))
-    low, high = settings.pv_range or (0.0, 100.0)
+    low, high = (settings.pv_range or PERCENT).ends
     span = high - low
     n = np.arange(SCANS)
     sp = low + span * chance.random(SCANS // 50).repeat(50)

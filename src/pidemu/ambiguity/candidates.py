@@ -15,7 +15,8 @@ from pidemu.ambiguity.meanings import as_reset_rates, bare, in_words, possible_u
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.certificate.models import EXACT
 from pidemu.errors import CardError, SettingError
-from pidemu.settings import RESERVED, Settings, off_values
+from pidemu.ranges import RANGES, option_of
+from pidemu.settings import Settings, off_values
 from pidemu.units import Role, parse_unit
 
 _FREQUENCIES: Final = np.geomspace(1e-7, 1e4, 133)
@@ -75,11 +76,11 @@ class Candidate:
     @property
     def words(self) -> list[str]:
         """Settings, options and ranges as words of the command line."""
-        ranges = zip(("--pv-range", "--op-range"), (self.settings.pv_range, self.settings.op_range), strict=True)
+        ranges = zip(RANGES, (self.settings.pv_range, self.settings.op_range), strict=True)
         return [
             *(f"{name}={written(value)}" for name, value in self.values.items()),
             *(f"{name}={choice}" for name, choice in self.options.items()),
-            *(f"{flag}={pair[0]:.15g},{pair[1]:.15g}" for flag, pair in ranges if pair is not None),
+            *(f"{option_of(name)}={given.argument}" for name, given in ranges if given is not None),
         ]
 
 
@@ -101,7 +102,7 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
         One for every meaning of the integral dial, under every choice of those open options that matter; empty where the values
         do not fit the card.
     """
-    ranges = {name: given[name] for name in RESERVED if name in given}
+    ranges: dict[str, object] = {name: given[name] for name in RANGES if name in given}
     stated = {name: str(v) for k, v in given.items() if (name := match_name(k, card.options))}
     dials = {k: v for k, v in given.items() if k not in ranges and not match_name(k, card.options)}
     open_options = [name for name in card.options if name not in stated]

@@ -54,7 +54,7 @@ def _windup(q: Equation) -> str:
         case WindupClamp():
             return "the sum of integral and P on PV is kept within the output limits, before it is used"
         case WindupGate():
-            return _gate(w) + _fast(w.fast_return)
+            return _gate(w)
         case WindupRecompute():
             then = "; D comes on top, and is limited again" if w.without_derivative else ""
             sides = "P" if w.without_derivative else "P - D"
@@ -66,7 +66,7 @@ def _windup(q: Equation) -> str:
             return f"each scan takes {share} of what was cut off out of the integral; {_tracking(q, w)}"
         case WindupExternalReset():
             lag = "positive feedback; the integral is a lag of the limited output, or of the external reset signal"
-            return lag + _fast(w.fast_return)
+            return lag + _fast(q, w)
         case WindupResetOutsideBand():
             return "the integral is 0 while PV is outside the proportional band"
         case WindupVelocity():
@@ -87,7 +87,9 @@ def _gate(w: WindupGate) -> str:
     if w.scheme == "conditional":
         if w.test == "error-times-output":
             return "the integral stands still while the sum is beyond a limit and has the sign of the error"
-        return "no integration that pushes further, while the sum is beyond a limit"
+        if w.last_increment == "dropped":
+            return "an increment that would lead beyond a limit is dropped; the output stops short of the limit"
+        return "an increment that leads beyond a limit counts as far as the limit"
     where = {
         "output": "while the last output is at a limit",
         "sum-without-derivative": "while P + I of the last scan is at a limit",
@@ -102,8 +104,12 @@ def _gate(w: WindupGate) -> str:
     return f"{'no integration' if w.judged_on == 'sum' else what[w.direction]} {where}{resumes}"
 
 
-def _fast(factor: float) -> str:
-    return "" if factor == 1 else f"; on the way back the integral time is divided by {factor:g}"
+def _fast(q: Equation, w: WindupExternalReset) -> str:
+    f = w.fast_return
+    if f is None:
+        return ""
+    beyond = f"while the output is above {named(q, f.high)} or below {named(q, f.low)}"
+    return f"; {beyond} and the integral on its way back, the integral time is divided by {f.factor:g}"
 
 
 def _tracking(q: Equation, w: WindupBackCalculation) -> str:

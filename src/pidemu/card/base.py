@@ -100,6 +100,11 @@ class Source(Model):
     title: Text = Field(description="Title of the document, with number and edition; or name and version of the program.")
     address: Text | None = Field(default=None, description="Where it can be read: address, document number or repository path.")
     read: Day = Field(description="The day it was read.")
+    product: Text | None = Field(
+        default=None,
+        description="The product that it is about, where that is another one than the card's. Such a source cannot document or "
+        "measure anything of this card; what follows from it is `inferred`.",
+    )
     note: Text | None = Field(
         default=None, description="What kind of witness it is, where that matters (a forum post, third-party code)."
     )

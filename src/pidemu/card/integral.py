@@ -33,7 +33,7 @@ class WindupGate(Model):
 
     scheme: Literal["freeze", "conditional"] = Field(
         description="`freeze`: no integration that pushes further while the last output is at a limit. `conditional`: no "
-        "integration while the output is beyond a limit and the increment would push it further."
+        "integration beyond a limit; an increment that leads there counts as far as the limit."
     )
     judged_on: Literal["output", "sum-without-derivative", "sum"] = Field(
         default="output",
@@ -55,9 +55,10 @@ class WindupGate(Model):
         description="What `conditional` takes for pushing further: the sign of the increment, or that of error times the sum "
         "before limits.",
     )
-    fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
-        default=1.0,
-        description="While the sum is beyond a limit and the integral on its way back, the integral time is divided by this.",
+    last_increment: Literal["to-the-limit", "dropped"] = Field(
+        default="to-the-limit",
+        description="What `conditional` does with an increment that leads beyond the limit: it keeps what leads to the limit, or "
+        "nothing. `dropped` stops short of the limit for as long as the error stays: only with a source that says so.",
     )
 
 
@@ -99,17 +100,27 @@ class WindupBackCalculation(Model):
     )
 
 
+class FastReturn(Model):
+    """An integral that comes back faster from beyond limits of its own."""
+
+    factor: Annotated[float, Field(ge=1, strict=True)] = Field(
+        description="The integral time is divided by this while the output is beyond one of the limits and the integral on its "
+        "way back, until the output is back at that limit."
+    )
+    high: Reference = Field(description="High limit [as the output]: a number, or the name of a setting.")
+    low: Reference = Field(description="Low limit, likewise.")
+
+
 class WindupExternalReset(Model):
     """Integral by positive feedback."""
 
     scheme: Literal["external-reset"] = Field(
-        description="The integral is a first-order lag, of the integral time, fed with the limited output less the other terms: "
-        "it stands still while the output stands at a limit. Backward and forward rules only. An external reset signal takes the "
-        "place of the limited output."
+        description="The integral is a first-order lag, of the integral time, fed with the limited output, less the derivative, "
+        "plus what P does not see of the error, `K (e - p)`: it stands still while the output stands at a limit. Backward and "
+        "forward rules only. An external reset signal takes the place of the limited output."
     )
-    fast_return: Annotated[float, Field(ge=1, strict=True)] = Field(
-        default=1.0,
-        description="While the sum is beyond a limit and the integral on its way back, the integral time is divided by this.",
+    fast_return: FastReturn | None = Field(
+        default=None, description="How the integral comes back from beyond limits that are not the output's; as ever, if absent."
     )
 
 

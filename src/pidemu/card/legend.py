@@ -90,8 +90,13 @@ def _setpoint(q: Equation) -> Iterator[str]:
         yield f"SPf = {limited}/(1 + Tsp s)"
         yield from _lag_time(q, "Tsp", sp.filter)
     if sp.rate is not None:
-        at_most = f"{named(q, sp.rate)}{'' if isinstance(sp.rate, str) else ' per s'}"
-        yield f"{'SPf' if sp.filter is None else 'SPr'} = SP, changing by at most {at_most}"
+        down = "" if sp.rate_down is None else f" upwards, {_per_second(q, sp.rate_down)} downwards"
+        local = "; a remote setpoint is not limited" if sp.rate_counts == "local" else ""
+        yield f"{'SPf' if sp.filter is None else 'SPr'} = SP, changing by at most {_per_second(q, sp.rate)}{down}{local}"
+
+
+def _per_second(q: Equation, given: str | float) -> str:
+    return f"{named(q, given)}{'' if isinstance(given, str) else ' per s'}"
 
 
 def _measurement(q: Equation) -> Iterator[str]:
@@ -155,6 +160,8 @@ def _of_derivative(q: Equation, filt: Filter) -> str:
     time = "Td"
     if filt.of == "effective-derivative":
         time = "Ti Td/(Ti + Td)" if q.integral.on != "none" else "Td"
+    elif filt.of == "derivative-time" and q.form is Form.PARALLEL:
+        return f"{short(filt.ratio)} x kd/kp" if filt.ratio is not None else f"kd/(kp {short(filt.gain)})"
     elif q.form is Form.PARALLEL:
         time = next((name for name, s in q.settings.items() if s.sets == "derivative"), "kd")
     return f"{short(filt.ratio)} x {time}" if filt.ratio is not None else f"{time} / {short(filt.gain)}"
@@ -181,11 +188,13 @@ def _canonical(q: Equation, role: str, name: str, unit: str) -> str:
     """Return a dial's canonical quantity as a formula."""
     dimension = _dimension(unit)
     if role == "gain":
+        own = q.signals == "engineering"
+        span = "OP span" if own else "PV span"
         return {
             Dimension.PERCENT: f"100/{name}",
-            Dimension.PV_UNITS: f"PV span/{name}",
-            Dimension.OP_PER_PV: name if q.signals == "engineering" else f"{name} x PV span/OP span",
-            Dimension.PERCENT_PER_PV: f"{name} x PV span/100",
+            Dimension.PV_UNITS: f"{span}/{name}",
+            Dimension.OP_PER_PV: name if own else f"{name} x PV span/OP span",
+            Dimension.PERCENT_PER_PV: f"{name} x {span}/100",
         }.get(dimension or Dimension.RATIO, name)
     inverse = role == "integral" and (dimension in _TIMES) == (q.form is Form.PARALLEL)
     return f"1/{name}" if inverse else name

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pidemu.card.load import Card, load_file
-from pidemu.errors import CardNotFoundError, suggest
+from pidemu.errors import CardError, CardNotFoundError, suggest
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
 
-_loaded: dict[tuple[Path, str | None], tuple[int, Card]] = {}
-"""Cards read so far, by file and id, with the time the file was changed."""
+_loaded: dict[tuple[Path, str | None], tuple[int, Card | CardError]] = {}
+"""Cards read so far, or what is wrong with them, by file and id, with the time the file was changed."""
 
 
 def builtin_folder() -> Path:
@@ -79,14 +79,15 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     Returns
     -------
     Card
-        The card, read once and kept as long as its file does not change.
+        The card, read once and kept as long as its file does not change. A card that is not built in is checked as
+        ``pidemu check`` does it.
 
     Raises
     ------
     CardNotFoundError
         There is no such card.
     CardError
-        The card is wrong.
+        The card is wrong: every fault with its file, line and column.
     """
     name = name.as_posix() if isinstance(name, Path) else name
     file = Path(name) if name.endswith((".yaml", ".yml")) else None
@@ -102,8 +103,24 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     key, changed = (file.absolute(), card_id), file.stat().st_mtime_ns
     kept = _loaded.get(key)
     if kept is None or kept[0] != changed:
-        kept = _loaded[key] = (changed, load_file(file, card_id))
+        kept = _loaded[key] = (changed, _read(file, card_id))
+    if isinstance(kept[1], CardError):
+        raise kept[1].with_traceback(None)
     return kept[1]
+
+
+def _read(file: Path, card_id: str | None) -> Card | CardError:
+    """Return the card of a file, or what is wrong with it; the built-in ones are checked when they are built in."""
+    try:
+        card = load_file(file, card_id)
+    except CardError as error:
+        return error
+    if file.resolve().is_relative_to(builtin_folder().resolve()):
+        return card
+    from pidemu.checks import check  # the rules run a card, and everything that runs one depends on cards
+
+    problems = check(card)
+    return CardError(problems) if problems else card
 
 
 def _suggest_block(name: str, known: list[str]) -> str:

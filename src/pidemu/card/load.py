@@ -23,7 +23,30 @@ EMULATION = "emulation"
 """Evidence key for how the emulation was verified; it leads to no field."""
 _REPLACED_WHOLE = ("filter", "windup")
 _SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
-_SCAN_BY_SCAN_KEYS = ("rule", "windup", "holds", "limits", "deadband", "rate", "starts", "tracks", "previous-scan")
+_SCAN_BY_SCAN_KEYS = (
+    "rule",
+    "windup",
+    "holds",
+    "limits",
+    "deadband",
+    "rate",
+    "starts",
+    "tracks",
+    "previous-scan",
+    "rate-down",
+    "rate-counts",
+)
+_BEYOND_THE_LAW = (
+    "tracking-time",
+    "integral-limit",
+    "windup-limit",
+    "deadband",
+    "bias",
+    "output-rate",
+    "setpoint-rate",
+    "resolution",
+)
+"""What dials set that the linear law leaves out."""
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
 
@@ -85,12 +108,15 @@ class Statement:
         The nearest evidence above it.
     key : str
         The evidence's own path in the card.
+    sets : str
+        Of a statement on a dial, what that dial sets.
     """
 
     path: str
     value: Any
     evidence: Evidence | None
     key: str
+    sets: str = ""
 
     @property
     def is_assumed(self) -> bool:
@@ -106,7 +132,8 @@ class Statement:
     def makes_the_law(self) -> bool:
         """Whether the linear law depends on it; the rest matters scan by scan, at limits and at transfers only."""
         head, *rest = self.path.split(".")
-        return head not in _SCAN_BY_SCAN and not any(key in _SCAN_BY_SCAN_KEYS for key in rest)
+        beyond = head in _SCAN_BY_SCAN or self.sets in _BEYOND_THE_LAW
+        return not beyond and not any(key in _SCAN_BY_SCAN_KEYS for key in rest)
 
     def __str__(self) -> str:
         note = f" ({self.evidence.note})" if self.evidence is not None and self.evidence.note else ""
@@ -157,7 +184,8 @@ class Variant:
             value: Any = self.raw
             for step in path:
                 value = value[step]
-            found.append(Statement(dotted(path), value, self.card.data.evidence.get(key or ""), key or dotted(home)))
+            sets = self.equation.settings[str(path[1])].sets if path[0] == "settings" else ""
+            found.append(Statement(dotted(path), value, self.card.data.evidence.get(key or ""), key or dotted(home), sets))
         return found
 
     def assumptions(self, defaulted: Iterable[str] | None = None) -> list[Statement]:

@@ -21,9 +21,9 @@ class Setting(Model):
 
     sets: Literal[
         "gain", "multiplier", "integral", "derivative", "filter-time", "filter-ratio", "filter-gain",
-        "proportional-weight", "derivative-weight", "tracking-time", "filter-factor", "integral-limit", "deadband", "gap-gain",
-        "linearity", "feedforward-gain", "bias", "output-rate", "setpoint-rate", "resolution", "process-gain", "process-time",
-        "process-delay", "closed-loop-time",
+        "proportional-weight", "derivative-weight", "tracking-time", "filter-factor", "integral-limit", "windup-limit", "deadband",
+        "gap-gain", "linearity", "feedforward-gain", "bias", "output-rate", "setpoint-rate", "resolution", "process-gain",
+        "process-time", "process-delay", "closed-loop-time",
     ] = Field(description="What the dial sets, and with that its unit's meaning; see *Settings* above, and specs/equations.md, "
               "section 1.")  # fmt: skip
     unit: Text = Field(

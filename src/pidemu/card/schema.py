@@ -29,9 +29,9 @@ _ORDER: Final = (
     CardFile, base.Source, models.Equation, terms.Setpoint, terms.Measurement, terms.SignalFilter, terms.ErrorShape,
     terms.Proportional, terms.Cascade, integral.Integral, integral.IntegralLimits, integral.WindupNone, integral.WindupClamp,
     integral.WindupGate, integral.WindupRecompute, integral.WindupBackCalculation, integral.WindupExternalReset,
-    integral.WindupVelocity, integral.WindupResetOutsideBand, terms.Derivative, terms.Filter, terms.Feedforward,
-    stages.Transfer, models.Setting, models.Option, stages.Action, stages.ActionExample, stages.Scan, stages.Output,
-    stages.Arithmetic, stages.Faults, base.Evidence, models.Quirk, models.Example, models.Canonical,
+    integral.FastReturn, integral.WindupVelocity, integral.WindupResetOutsideBand, terms.Derivative, terms.Filter,
+    terms.Feedforward, stages.Transfer, models.Setting, models.Option, stages.Action, stages.ActionExample, stages.Scan,
+    stages.Output, stages.Arithmetic, stages.Faults, base.Evidence, models.Quirk, models.Example, models.Canonical,
 )  # fmt: skip
 
 

@@ -63,6 +63,12 @@ class Setpoint(Model):
         description="Fastest change of the setpoint that the algorithm sees [as the measurement, per second]: a "
         "number, or the name of a setting.",
     )
+    rate_down: Reference | None = Field(
+        default=None, description="Fastest fall of the setpoint, where that is another; `rate` is then the fastest rise."
+    )
+    rate_counts: Literal["always", "local"] = Field(
+        default="always", description="Whether the rates limit a remote setpoint too, in cascade, or the local one only."
+    )
     starts: Literal["setpoint", "zero"] = Field(
         default="setpoint", description="Where the limited setpoint starts at power-up: at the setpoint, or at zero."
     )
@@ -127,10 +133,11 @@ class Filter(Model):
         default=None, description="Derivative gain N, the inverse of `ratio`: a number, or the name of a setting."
     )
     time: SettingName | Number | None = Field(default=None, description="`Tf` itself: seconds, or the name of a setting.")
-    of: Literal["derivative", "effective-derivative"] = Field(
+    of: Literal["derivative", "derivative-time", "effective-derivative"] = Field(
         default="derivative",
-        description="The time that `ratio` or `gain` refers to: the derivative setting, or `Ti Td/(Ti + Td)`, the derivative time "
-        "of the equivalent standard form.",
+        description="The time that `ratio` or `gain` refers to. `derivative`: the derivative setting. `derivative-time`: `Td`, "
+        "which is `kd/kp` in the parallel form, so that the filter time there is `kd/(kp N)`. `effective-derivative`: "
+        "`Ti Td/(Ti + Td)`, the derivative time of the equivalent standard form.",
     )
     rule: GeneralRule | None = Field(
         default=None, description="Scan rule of a filter on measurement or output; by default the derivative's rule."

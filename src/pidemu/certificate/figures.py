@@ -34,20 +34,25 @@ def number(x: float) -> str:
 
 
 def percent(deviation: float) -> str:
-    """Return a relative deviation in percent, with two digits; ``none`` for one that is only rounding."""
+    """Return a relative deviation in percent, with two digits; ``none`` for one that is only rounding.
+
+    An infinite one is ``not comparable``: the source has no response there, and the target has one.
+    """
+    if math.isinf(deviation):
+        return "not comparable"
     if deviation < EXACT:
         return "none"
     return f"{number(float(f'{100 * deviation:.2g}'))} %" if deviation < 10 else "over 1000 %"
 
 
 def decibels(band: Band) -> str:
-    """Return the largest difference of gain."""
-    return f"{band.gain_db:.2f} dB"
+    """Return the largest difference of gain; ``-`` where one of the two has no response."""
+    return f"{band.gain_db:.2f} dB" if math.isfinite(band.gain_db) else "-"
 
 
 def degrees(band: Band) -> str:
-    """Return the largest difference of phase."""
-    return f"{band.phase_deg:.1f} deg"
+    """Return the largest difference of phase; ``-`` where one of the two has no response."""
+    return f"{band.phase_deg:.1f} deg" if math.isfinite(band.phase_deg) else "-"
 
 
 def unit_of(v: Value) -> str:

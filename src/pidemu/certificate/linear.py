@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 _POINTS: Final = 300
+_ROUNDING: Final = 1e-14
+"""Part of a response's largest value that is rounding."""
+_NO_TIME: Final = 1e-9
+"""Part of the other times that a derivative time of rounding is at most."""
 
 
 def time_scale(law: Law) -> float:
@@ -27,10 +31,19 @@ def time_scale(law: Law) -> float:
     Without integral action the derivative time ``m2/m1`` takes its place, without proportional action the reciprocal of the
     integral gain, and for proportional action alone, which has no time scale, one second.
     """
-    m0, m1, m2 = law.moments()
+    m0, m1, _ = law.moments()
     if m0:
         return abs(m1 / m0) if m1 / m0 > 0 else 1 / abs(m0)
-    return abs(m2 / m1) if m1 and m2 else 1.0
+    return abs(_derivative_time(law, 0.0)) or 1.0
+
+
+def _derivative_time(law: Law, Ti: float) -> float:
+    """Return ``m2/m1`` [s]; 0 where that is rounding, which a filter without derivative leaves beside the other times."""
+    _, m1, m2 = law.moments()
+    den = law.feedback.den[1:] if law.feedback.den[0] == 0 else law.feedback.den
+    lag = abs(den[1] / den[0]) if len(den) > 1 else 0.0
+    Td = m2 / m1 if m1 else 0.0
+    return Td if abs(Td) > _NO_TIME * (Ti + lag) else 0.0
 
 
 def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -46,8 +59,8 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
         The process, where it is known: the loop band then ends at twice the frequency where its phase is -180 degrees.
     """
     Ti = time_scale(law)
-    _, m1, m2 = law.moments()
-    Td = m2 / m1 if m1 and m2 / m1 > 0 else Ti
+    Td = _derivative_time(law, Ti)
+    Td = Td if Td > 0 else Ti
     nyquist = math.pi / scan if scan is not None else math.inf
     low = 0.01 / Ti
     end = 5 / Ti if process is None or not math.isfinite(process.w180) else 2 * process.w180
@@ -56,14 +69,22 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
 
 
 def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
-    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign."""
+    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign.
+
+    A response below 1e-14 of its largest is nothing but rounding, and counts as zero: a trapezoidal integral has none at half the
+    scan rate, P on PV none to the setpoint. Where both are zero there is no difference. Where one is, the differences of gain and
+    phase are infinite; so is the deviation where that one is the source, and 1 where it is the target.
+    """
+    nothing, gone = (np.abs(x) <= _ROUNDING * np.max(np.abs(x)) for x in (source, target))
+    either = nothing | gone
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = target / source
-        ratio[(source == 0) & (target == 0)] = 1.0
-        deviation = np.abs(ratio - 1)
+        ratio = np.where(either, 1.0, target / np.where(either, 1.0, source))
+        deviation = np.where(gone, 1.0, np.abs(ratio - 1))
         gain = np.abs(20 * np.log10(np.abs(ratio)))
         phase = np.abs(np.degrees(np.angle(ratio)))
-    return np.where(np.isnan(deviation), np.inf, deviation), np.where(np.isnan(gain), np.inf, gain), np.nan_to_num(phase)
+    found = np.where(nothing, np.inf, deviation), np.where(either, np.inf, gain), np.where(either, np.inf, phase)
+    first, second, third = (np.where(nothing & gone, 0.0, np.where(np.isnan(x), np.inf, x)) for x in found)
+    return first, second, third
 
 
 def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Response], low: float, high: float) -> Band:

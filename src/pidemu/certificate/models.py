@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Final, Literal
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pidemu.plain import json_safe
+
+if TYPE_CHECKING:
+    from pidemu.certificate.proof import Proof
 
 Verdict = Literal["exact", "exact-feedback", "approximate", "refused"]
 RANK: Final[dict[str, int]] = {"exact": 0, "exact-feedback": 1, "approximate": 2, "refused": 3}
@@ -26,9 +29,9 @@ class Band:
     low, high : float
         Ends of the band [rad/s].
     max_deviation : float
-        ``max |Ct/Cs - 1|``.
+        ``max |Ct/Cs - 1|``; infinite where the source has no response and the target has one, so that the two cannot be compared.
     gain_db, phase_deg : float
-        Largest difference of gain [dB] and phase [deg], whatever its sign.
+        Largest difference of gain [dB] and phase [deg], whatever its sign; infinite where one of the two has no response.
     worst_at : float
         Frequency of the largest deviation [rad/s].
     """
@@ -155,10 +158,10 @@ class NonlinearDifference:
 
     Attributes
     ----------
-    aspect : {"windup", "transfer", "limits", "arithmetic", "error", "output", "setpoint"}
+    aspect : {"windup", "transfer", "bias", "limits", "arithmetic", "error", "output", "setpoint"}
         What it is about.
     text : str
-        The difference in one sentence, with its numbers.
+        The difference in a sentence or two, with its numbers.
     figures : dict of str to tuple of float
         The numbers by name, with the unit in brackets, of source and target; infinite where something never happens.
     """
@@ -166,6 +169,11 @@ class NonlinearDifference:
     aspect: str
     text: str
     figures: Mapping[str, tuple[float, float]]
+
+    @property
+    def inside_limits(self) -> bool:
+        """Whether it shows in automatic with the output inside its limits; the others show at limits and transfers only."""
+        return self.aspect in ("arithmetic", "error", "output", "setpoint")
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +277,10 @@ class Certificate:
         Whether the settings make up for the scans: what counts is then the laws at the scan intervals, else the continuous ones.
     time_scale : float
         The source's effective integral time, which places the loop band [s].
+    shifts_for_good : bool
+        Whether a limit leaves the two apart for good, as nothing integrates and the target forgets where it was.
+    proof : Proof or None
+        Both laws compared without rounding, where they agree as far as floats can tell.
     scan_by_scan : ScanByScan or None
         Both controllers emulated; ``None`` where they cannot be, see `not_emulated`.
     not_emulated : str
@@ -295,6 +307,8 @@ class Certificate:
     setpoint_in_cascade: PathComparison | None = None
     kick_in_cascade: Kick | None = None
     compensated: bool = False
+    shifts_for_good: bool = False
+    proof: Proof | None = None
     scan_by_scan: ScanByScan | None = None
     not_emulated: str = ""
     scan_cost: ScanCost | None = None
@@ -336,16 +350,33 @@ class Certificate:
         contradicted = emulated is not None and emulated.same_rules and not emulated.is_exact_on_measurement
         slow = self.scan_cost is not None and self.scan_cost.matters and not self.compensated
         coarse = self.rounding is not None and self.rounding > COARSE
-        if self.is_bent or contradicted or slow or coarse or not (self.feedback_before_rounding or self.headline).is_exact:
+        moved = self.is_bent or contradicted or slow or coarse or self.shifts_for_good
+        if moved or not self.feedback_is_exact:
             return "approximate"
-        path = self.setpoint_before_rounding or self.setpoint_headline
+        same = self.setpoint_is_exact_in(mode) and "setpoint" not in {d.aspect for d in self.nonlinear}
+        return "exact" if same else "exact-feedback"
+
+    @property
+    def feedback_is_exact(self) -> bool:
+        """Whether the laws for measurement are the same: proven without rounding where that is decided, else by floats."""
+        if self.proof is not None and self.proof.decided:
+            return self.proof.feedback_equal
+        return (self.feedback_before_rounding or self.headline).is_exact
+
+    def setpoint_is_exact_in(self, mode: Literal["auto", "cascade"]) -> bool:
+        """Whether the setpoint paths are the same in a mode, likewise."""
+        if self.proof is not None and self.proof.decided:
+            if self.setpoint_in_cascade is None:  # one path in every mode looked at
+                return self.proof.setpoint_equal
+            return self.proof.equal("setpoint in cascade" if mode == "cascade" else "setpoint")
         if mode == "cascade" and self.setpoint_in_cascade is not None:
-            path = self.setpoint_in_cascade
-        return "exact" if path.is_exact and "setpoint" not in {d.aspect for d in self.nonlinear} else "exact-feedback"
+            return self.setpoint_in_cascade.is_exact
+        return (self.setpoint_before_rounding or self.setpoint_headline).is_exact
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""
-        plain: dict[str, Any] = json_safe(asdict(self))
+        plain: dict[str, Any] = json_safe(asdict(replace(self, proof=None)))
+        plain["proof"] = None if self.proof is None else self.proof.to_dict()
         for name in ("setpoint_kick", "setpoint_kick_at_scan", "kick_in_cascade"):
             kick: Kick | None = getattr(self, name)
             if kick is not None:

@@ -42,14 +42,12 @@ class Side:
     @property
     def pv_percent(self) -> float:
         """Percent of the measurement's span per unit that the card computes in; 1 where no range is given."""
-        low, high = (self.engineering and self.settings.pv_range) or (0.0, 100.0)
-        return 100 / (high - low)
+        return 100 / self.settings.own_ranges[0].span
 
     @property
     def op_percent(self) -> float:
         """The same for the output."""
-        low, high = (self.engineering and self.settings.op_range) or (0.0, 100.0)
-        return 100 / (high - low)
+        return 100 / self.settings.own_ranges[1].span
 
     @property
     def integrates(self) -> bool:
@@ -69,7 +67,7 @@ class Side:
     @property
     def limits_percent(self) -> tuple[float, float]:
         """The same [% of the output span]; where no range is given 0 to 100 is taken for it."""
-        zero = self.settings.op_range[0] if self.engineering and self.settings.op_range else 0.0
+        zero = self.settings.own_ranges[1].low
         low, high = self.limits
         return (low - zero) * self.op_percent, (high - zero) * self.op_percent
 

@@ -24,17 +24,17 @@ def limit_differences(source: Side, target: Side) -> Iterator[NonlinearDifferenc
     if not (alike(*low) and alike(*high)):
         unit = units[0] if units[0] == units[1] else "% or engineering units"
         figures |= {f"low output limit [{unit}]": _pair(low), f"high output limit [{unit}]": _pair(high)}
-        words = " and ".join(f"{_span((low[i], high[i]), units[i])} on {both[i].name}" for i in (0, 1))
-        parts.append(f"default output limits differ: {words}{_in_own_units(target)}")
+        words = ", ".join(f"{_span((low[i], high[i]), units[i])} on {both[i].name}" for i in (0, 1))
+        parts.append(f"Output limits as delivered: {words}. Set those of the old controller on the new one{_in_own_units(target)}.")
     if all(side.integrates for side in both):
         mine, other = (_integral_limits(side) for side in both)
         if not (alike(mine[0], other[0]) and alike(mine[1], other[1])):
             figures |= {"low limit of the integral term [% of output span]": (mine[0], other[0])}
             figures |= {"high limit of the integral term [% of output span]": (mine[1], other[1])}
-            words = " and ".join(f"{_span(found, '%')} on {side.name}" for found, side in zip((mine, other), both, strict=True))
-            parts.append(f"limits of the integral term itself, besides what windup does, differ: {words}")
+            words = ", ".join(f"{_span(found, '%')} on {side.name}" for found, side in zip((mine, other), both, strict=True))
+            parts.append(f"Limits of the integral term itself: {words}.")
     if parts:
-        yield NonlinearDifference("limits", "; ".join(parts), figures)
+        yield NonlinearDifference("limits", " ".join(parts), figures)
 
 
 def _in_own_units(target: Side) -> str:
@@ -42,9 +42,8 @@ def _in_own_units(target: Side) -> str:
     if not target.engineering:
         return ""
     if target.settings.op_range is None:
-        return f"; {target.name} has its limits in engineering units, so give the range of the output to have them in %"
-    low, high = target.settings.op_range
-    return f"; 0 to 100 % is {low:g} to {high:g} in the units of {target.name}"
+        return f"; {target.name} has them in engineering units: give the range of the output to see them in %"
+    return f"; 0 to 100 % is {target.settings.op_range} there"
 
 
 def _span(limits: Pair, unit: str) -> str:
@@ -63,7 +62,7 @@ def _integral_limits(side: Side) -> Pair:
         return -math.inf, math.inf
     given = unlimited((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
     gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.holds]
-    zero = side.settings.op_range[0] if side.engineering and side.settings.op_range else 0.0
+    zero = side.settings.own_ranges[1].low
     low, high = sorted((gain * x - zero) * side.op_percent for x in given)
     return low, high
 
@@ -84,8 +83,8 @@ def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifferenc
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     shapes = [side.own.shape for side in (source, target)]
     if found or _fine_print(shapes[0]) != _fine_print(shapes[1]):
-        words = ", ".join(f"{side.name} {_error_words(side)}" for side in (source, target))
-        yield NonlinearDifference("error", f"what is done to the error differs: {words}", found)
+        words = "; ".join(f"{side.name} {_error_words(side)}" for side in (source, target))
+        yield NonlinearDifference("error", f"The error is used differently: {words}.", found)
 
 
 def _gap(side: Side) -> Shape:
@@ -115,18 +114,18 @@ def _fine_print(shape: Shape | None) -> tuple[object, ...]:
 
 def _error_words(side: Side) -> str:
     shape, band = side.own.shape, (side.own.integral_deadband or 0.0) * side.pv_percent
-    still = f"does not integrate while it is within {band:.4g} %" if not alike(band, 0.0) else ""
+    still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
     if shape is None:
-        return still or "takes it as it is"
+        return still or "uses it as it is"
     if shape.kind == "gap":
-        gain = f"counts it {shape.gain:g} times" if shape.gain else "takes it for zero"
+        gain = f"multiplies it by {shape.gain:g}" if shape.gain else "takes it as zero"
         text = f"{gain} within {_band(side):.4g} %"
-        text += ", less the band outside" if shape.subtracted else ""
-        text += ", once it has changed its sign there" if shape.zero_crossing else ""
+        text += ", and subtracts the band outside" if shape.subtracted else ""
+        text += ", from its first change of sign there" if shape.zero_crossing else ""
     elif shape.kind == "squared":
-        text = f"squares it, with gain 1 at {_over(side):.4g} %"
+        text = f"squares it (gain 1 at {_over(side):.4g} %)"
     else:
-        text = f"gives it a gain of {shape.linearity:g} near zero that grows to 1 at {_over(side):.4g} %"
+        text = f"gives it a gain of {shape.linearity:g} near zero, rising to 1 at {_over(side):.4g} %"
     where = "" if shape.on_integral and shape.on_proportional else " for the integral" if shape.on_integral else " for P"
     return f"{text}{where}{' and ' + still if still else ''}"
 
@@ -148,16 +147,21 @@ def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifferen
 def setpoint_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
     """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual."""
     words = [
-        f"{side.name} lets the setpoint follow the measurement in manual, where it stays until it is changed"
+        f"On {side.name} the setpoint follows PV in manual and stays there until it is changed"
         for side, other in ((source, target), (target, source))
         if side.own.sp_tracks and not other.own.sp_tracks
     ]
     words += [
-        f"{side.name} starts its limited setpoint at zero"
+        f"On {side.name} the rate-limited setpoint starts at zero at power-up"
         for side, other in ((source, target), (target, source))
         if _from_zero(side) and not _from_zero(other)
     ]
-    rates = {"setpoint rate limit [%/s]": _of(source, target, lambda side: side.own.sp_rate * side.pv_percent)}
+    rates = {
+        "setpoint rate limit [%/s]": _of(source, target, lambda side: side.own.sp_rate * side.pv_percent),
+        "setpoint rate limit downwards [%/s]": _of(source, target, lambda side: side.own.sp_rate_down * side.pv_percent),
+    }
+    if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(s.own.sp_rate == s.own.sp_rate_down for s in (source, target)):
+        del rates["setpoint rate limit downwards [%/s]"]
     yield from _numbers("setpoint", (source, target), rates, words)
 
 
@@ -166,15 +170,15 @@ def _from_zero(side: Side) -> bool:
 
 
 def _numbers(aspect: str, both: tuple[Side, Side], figures: Figures, words: list[str]) -> Iterator[NonlinearDifference]:
-    """Yield the figures that differ as one difference, with further words."""
+    """Yield the figures that differ as one difference, with further sentences."""
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     parts = []
     for name, pair in found.items():
         what, unit = name.removesuffix("]").split(" [")
         each = (f"{_or_none(x, unit)} on {side.name}" for x, side in zip(pair, both, strict=True))
-        parts.append(f"{what}: {', '.join(each)}")
+        parts.append(f"{what[0].upper()}{what[1:]}: {', '.join(each)}")
     if parts or words:
-        yield NonlinearDifference(aspect, "; ".join([*parts, *words]), found)
+        yield NonlinearDifference(aspect, f"{'. '.join([*parts, *words])}.", found)
 
 
 def _or_none(x: float, unit: str) -> str:

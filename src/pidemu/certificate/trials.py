@@ -1,4 +1,4 @@
-"""What a controller does at an output limit and at transfers, found by emulation on parts of the standard record."""
+"""What both controllers are tried with at limits and transfers: parts of the standard record, and what each makes of them."""
 
 from __future__ import annotations
 
@@ -9,20 +9,30 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.certificate.scanwise import WIDE
 from pidemu.certificate.sides import Side
 from pidemu.emulator import Controller
 from pidemu.errors import ScanError
-from pidemu.record.files import Floats
-from pidemu.record.playback import Timing, limits_of
+from pidemu.record.files import Floats, Record
+from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for
 from pidemu.record.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
 from pidemu.scan.build import Action
-from pidemu.settings import Settings
 
 _MOST_SCANS: Final = 2000
 """The characteristic time is at most this many scans: it is a figure that is wanted, not a plot."""
 _TOO_MANY: Final = 10_000
 """With more it is not tried: the other's interval is so much longer that the two have no time in common."""
+_SLOW: Final = 5.0
+"""A large error changes in so many derivative times, so that the derivative adds 40 % to what P does when it reverses."""
+_FARTHEST: Final = 45.0
+"""The largest error [% of the measurement span]: the measurement alone makes it, from 50 %."""
+STEPS: Final = ("large positive error", "manual")
+"""Parts of the standard record with a large error, as much of it the other way, and none: from the first to before the second."""
+NOISE: Final = ("into a limit, with noise", "")
+"""Parts with a ramp into a limit and back, with noise; to the end."""
+Course = tuple[Floats, Floats]
+"""Times from the start of a part [s], and outputs [% of the output span]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +45,19 @@ class Plan:
         Characteristic time [s] and size [% of the source's measurement span] of the standard record.
     limits : tuple of float
         Output limits of both [% of the output span].
+    ramp : float
+        How long the large error takes to change [s]: no measurement in a plant steps by as much, and a derivative would kick.
     """
 
     time: float
     size: float
     limits: tuple[float, float]
+    ramp: float = 0.0
 
     @property
     def error(self) -> float:
         """The large error [% of the source's measurement span]."""
-        return min(8 * self.size, 90.0)
+        return min(8 * self.size, _FARTHEST)
 
     @property
     def offset(self) -> float:
@@ -53,72 +66,43 @@ class Plan:
 
     @property
     def middle(self) -> float:
-        """The output at rest [% of the output span]: in the middle between the limits."""
+        """The output in the middle between the limits [% of the output span]."""
         return sum(self.limits) / 2
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """What a controller did.
-
-    Attributes
-    ----------
-    at_limit : bool
-        Whether the large error brought it to a limit, where it stood when the error changed its sign.
-    stays : float
-        For how long it stood there from the first scan with the error of the other sign [s]: 0 where that scan leaves it for good,
-        infinite where it does not leave while that error lasts.
-    at_zero : float
-        Its output with the error back at zero, in the end [% of the output span].
-    to_manual : float
-        Bump at the transfer to manual where the operator's output is what the output was [% of the output span].
-    to_automatic : float
-        Bump at the transfer to automatic with an error [% of the output span].
-    """
-
-    at_limit: bool
-    stays: float
-    at_zero: float
-    to_manual: float
-    to_automatic: float
-
-
-def planned(source: Settings, scans: tuple[float, float], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
+def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
     """Return what to try: with this time and size, or with another time where that takes too many scans, or too few.
 
     Parameters
     ----------
-    source : Settings
-        The source, which sets the size that goes with another time.
-    scans : tuple of float
-        Scan intervals of source and target [s].
+    both : tuple of Side
+        Source and target; the source sets the size that goes with another time.
     time_and_size : tuple of float
         Characteristic time [s] and size [%].
     limits : tuple of float
         Output limits [%].
     """
     time, size = time_and_size
+    source, scans = both[0].settings, (both[0].scan, both[1].scan)
     shortest = LEAST_SCANS * max(scans)
     longest = max(_MOST_SCANS * min(scans), shortest)
     if time > longest:
         time, size = scale_of(source, longest / MOST_SCANS)  # of which this is the longest time
     elif time < shortest:
         time, size = scale_of(source, max(scans))
-    return Plan(time, size, limits)
+    derivative = max(abs(side.own.kd / side.own.kp) if side.own.kp else abs(side.own.kd) * time for side in both)
+    return Plan(time, size, limits, min(_SLOW * derivative, time / 2))
 
 
-def tried(side: Side, plan: Plan, action: Action, span: float) -> Trial:
-    """Run a controller at rest into its limit and back, and at rest again through manual and back.
-
-    The signals are those of the standard record from ``large positive error`` to ``back from the limit``, and those of ``manual``
-    with the first scan of ``return to automatic``; the operator starts from what the output was.
+class Bench:
+    """One of the two controllers, to be tried.
 
     Parameters
     ----------
     side : Side
         The controller.
     plan : Plan
-        Time, size and limits.
+        What is tried.
     action : {"reverse", "direct"}
         Control action.
     span : float
@@ -127,69 +111,128 @@ def tried(side: Side, plan: Plan, action: Action, span: float) -> Trial:
     Raises
     ------
     ScanError
-        It cannot be emulated at this interval, which includes an output that overflows.
+        It cannot be emulated at this interval.
     """
-    if plan.time > _TOO_MANY * side.scan:
-        raise ScanError(
-            f"its scan interval of {side.scan:g} s is too short beside the other's; give intervals nearer to each other"
+
+    def __init__(self, side: Side, plan: Plan, action: Action, span: float) -> None:
+        if plan.time > _TOO_MANY * side.scan:
+            raise ScanError(
+                f"its scan interval of {side.scan:g} s is too short beside the other's; give intervals nearer to each other"
+            )
+        self._side, self._plan, self._action, self._span = side, plan, action, span
+        self._scale = Scale(side.settings)
+        self._record = _record(side.scan, plan.time, plan.size)
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What makes two of them the same."""
+        return self._side.settings.card.id, self._side.settings, self._side.scan, self._plan, self._action, self._span
+
+    def course(self, part: tuple[str, str], start: float, *, limited: bool) -> Course:
+        """Return what the controller does with the error of some parts of the record, made by the measurement alone.
+
+        Parameters
+        ----------
+        part : tuple of str
+            The first part, and the one before which it ends.
+        start : float
+            The output at rest before it [% of the output span].
+        limited : bool
+            Whether the output limits are those of the plan, or none.
+
+        Raises
+        ------
+        ScanError
+            The output overflows.
+        """
+        first = self._begins(part[0])
+        last = self._begins(part[1]) if part[1] else self._record.sp.size
+        times = self._since(part[0])[first:last]
+        error = (self._record.sp - self._record.pv)[first:last]
+        if part == STEPS:
+            error = self._plan.error * self._softened(times, error / np.max(np.abs(error)))
+        pv = REST - self._span * error
+        own = self._scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
+        controller = self._at_rest(start, self._plan.limits if limited else WIDE)
+        outputs = self._scale.output_percent(controller.run(own.sp, own.pv))
+        if not np.isfinite(outputs).all():
+            raise self._overflow()
+        return times, outputs
+
+    def transfers(self) -> tuple[float, float]:
+        """Return the bumps at the transfers to manual and back [% of the output span].
+
+        The signals are those of ``manual`` with the first scan of ``return to automatic``; the operator starts from what the output
+        was.
+
+        Raises
+        ------
+        ScanError
+            The output overflows.
+        """
+        (low, high), record = self._plan.limits, self._record
+        assert record.manual is not None
+        seen = replace(
+            record,
+            sp=REST + (record.sp - REST) * self._span,
+            pv=REST + (record.pv - REST) * self._span,
+            manual=low + record.manual * ((high - low) / 100),
         )
-    record = _record(side.scan, plan.time, plan.size)
-    seen = replace(record, sp=REST + (record.sp - REST) * span, pv=REST + (record.pv - REST) * span)
-    low, high = plan.limits
-    if record.manual is not None:
-        seen = replace(seen, manual=low + record.manual * ((high - low) / 100))
-    scale = Scale(side.settings)
-    own = scale.own(seen)
-    assert isinstance(own, StandardRecord)
-    controller, _ = controller_for(side.settings, Timing(side.scan), action, plan.limits, plan.middle)
-    controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(plan.middle))
-    at_rest = controller.state
-    at_limit, stays, at_zero = _into_the_limit(controller, own, scale)
-    controller.reset()
-    controller.start(**at_rest)
-    to_manual, to_automatic = (bump * side.op_percent for bump in _through_manual(controller, own))
-    if not all(map(math.isfinite, (at_zero, to_manual, to_automatic))):
-        reasons = "; ".join(side.own.too_coarse(side.scan)) or "the settings are unstable by themselves"
-        raise ScanError(f"its output overflows at a scan interval of {side.scan:g} s: {reasons}")
-    return Trial(at_limit, stays, at_zero, to_manual, to_automatic)
+        own = self._scale.own(seen)
+        assert own.manual is not None
+        controller = self._at_rest(self._plan.middle, self._plan.limits)
+        controller.run(own.sp[:3], own.pv[:3])
+        start, end = self._begins("manual"), self._begins("return to automatic")
+        last = controller.output
+        by_hand: Floats = np.concatenate((np.array([last]), own.manual[start + 1 : end]))
+        moved = controller.run(own.sp[start:end], own.pv[start:end], False, by_hand)
+        after = controller.run(own.sp[end : end + 1], own.pv[end : end + 1])
+        bumps = (float(moved[0]) - last) * self._side.op_percent, (float(after[0]) - float(moved[-1])) * self._side.op_percent
+        if not all(map(math.isfinite, bumps)):
+            raise self._overflow()
+        return bumps
+
+    def check(self) -> None:
+        """Try whether the controller can be emulated at all.
+
+        Raises
+        ------
+        ScanError
+            It cannot, or its output overflows.
+        """
+        self.course(STEPS, self._plan.middle, limited=True)
+
+    def _softened(self, times: Floats, error: Floats) -> Floats:
+        """Return the steps of an error of size 1, each taking the time of the plan."""
+        time, ramp = self._plan.time, self._plan.ramp
+        if not ramp:
+            return error
+        edges = [0.0, ramp, 2 * time, 2 * time + ramp, 5 * time, 5 * time + ramp]
+        softened: Floats = np.interp(times, edges, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+        return softened
+
+    def _at_rest(self, start: float, limits: tuple[float, float]) -> Controller:
+        controller, _ = controller_for(self._side.settings, Timing(self._side.scan), self._action, limits, start)
+        rest = float(self._scale.signals_own(np.array(REST)))
+        controller.rest(rest, rest, self._scale.output_own(start))
+        return controller
+
+    def _begins(self, name: str) -> int:
+        """Return the first sample of a segment."""
+        return int(np.searchsorted(self._since(name), -1e-6 * self._side.scan))
+
+    def _since(self, name: str) -> Floats:
+        """Return the times of the record since a segment began [s]."""
+        assert self._record.time is not None
+        times: Floats = self._record.time - next(s.start for s in self._record.segments if s.name == name)
+        return times
+
+    def _overflow(self) -> ScanError:
+        reasons = "; ".join(self._side.own.too_coarse(self._side.scan)) or "the settings are unstable by themselves"
+        return ScanError(f"its output overflows at a scan interval of {self._side.scan:g} s: {reasons}")
 
 
 @lru_cache(maxsize=2)
 def _record(scan: float, time: float, size: float) -> StandardRecord:
     """Return the standard record; mostly source and target want the same one."""
     return standard_record(scan, time=time, size=size)
-
-
-def _into_the_limit(controller: Controller, own: StandardRecord, scale: Scale) -> tuple[bool, float, float]:
-    """Return whether the large error leads to a limit, how long it holds there once it has turned [s], and the output after it."""
-    start, turn = (_begins(own, f"large {sign} error") for sign in ("positive", "negative"))
-    back, end = _begins(own, "back from the limit"), _begins(own, "manual")
-    outputs = controller.run(own.sp[start:end], own.pv[start:end])
-    low, high = limits_of(controller)
-    before = outputs[turn - start - 1]
-    if not (before >= high or before <= low):
-        return False, 0.0, float(scale.output_percent(outputs[-1:])[0])
-    held: Floats = outputs[turn - start : back - start]
-    still = np.flatnonzero(held >= high if before >= high else held <= low)
-    off = int(still[-1]) + 1 if still.size else 0
-    stays = math.inf if off >= held.size else off * controller.interval
-    return True, stays, float(scale.output_percent(outputs[-1:])[0])
-
-
-def _through_manual(controller: Controller, own: StandardRecord) -> tuple[float, float]:
-    """Return the bumps from automatic to manual and back [as the output]."""
-    controller.run(own.sp[:3], own.pv[:3])
-    start, end = _begins(own, "manual"), _begins(own, "return to automatic")
-    assert own.manual is not None
-    last = controller.output
-    by_hand = np.concatenate(([last], own.manual[start + 1 : end]))
-    moved = controller.run(own.sp[start:end], own.pv[start:end], False, by_hand)
-    after = controller.run(own.sp[end : end + 1], own.pv[end : end + 1])
-    return float(moved[0]) - last, float(after[0]) - float(moved[-1])
-
-
-def _begins(record: StandardRecord, name: str) -> int:
-    """Return the first sample of a segment."""
-    assert record.time is not None
-    at = next(s.start for s in record.segments if s.name == name)
-    return int(np.searchsorted(record.time, at - 1e-6 * (record.time[1] - record.time[0])))

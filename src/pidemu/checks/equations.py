@@ -16,9 +16,9 @@ from pidemu.card.references import BY_ROLE, references
 from pidemu.card.source import Path_
 from pidemu.card.terms import Derivative, Proportional
 from pidemu.checks import stages
-from pidemu.errors import PidemuError, Problem, suggest
+from pidemu.errors import PidemuError, Problem, UnitError, suggest
 from pidemu.settings import limits, off_values
-from pidemu.units import Dimension, Role, check_unit, parse_quantity, parse_unit
+from pidemu.units import LEVELS, RATES, Dimension, Role, Unit, check_unit, parse_quantity, parse_unit
 
 _NEUTRAL: Final = {
     "multiplier": 1.0,
@@ -58,8 +58,42 @@ def reject_bad_units(variant: Variant) -> Iterator[Problem]:
             continue
         if unit.name != setting.unit:
             yield variant.card.document.problem(home, f"write the unit '{unit.name}'")
-        if setting.sets == "gain" and variant.equation.signals == "engineering" and unit.dimension is not Dimension.OP_PER_PV:
-            yield variant.card.document.problem(home, "with 'signals: engineering' the gain's unit is 'eu/eu'")
+        if variant.equation.signals == "engineering":
+            yield from (
+                variant.card.document.problem(home, m) for m in _wrong_in_own_units(variant.equation, Role(setting.sets), unit)
+            )
+
+
+def _wrong_in_own_units(equation: Equation, role: Role, unit: Unit) -> Iterator[str]:
+    """Yield why a unit does not go with signals in engineering units."""
+    if role is Role.GAIN:
+        whole_output = unit.dimension in (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
+        if equation.form == "parallel" and unit.dimension is not Dimension.OP_PER_PV:
+            yield "with 'signals: engineering' the gain of a parallel form is in 'eu/eu', as its integral and derivative gains are"
+        elif not whole_output and unit.dimension is not Dimension.OP_PER_PV:
+            yield "with 'signals: engineering' the gain's unit is 'eu/eu', '%/eu', or for a proportional band 'eu'"
+        elif whole_output and not all(map(math.isfinite, equation.output.limits)):
+            yield f"'{unit.name}' refers to the output's range, and 'output.limits' is infinite; give limits, or a gain in 'eu/eu'"
+    in_percent = unit.dimension is Dimension.PERCENT_PER_TIME or (role in LEVELS and unit.dimension is Dimension.PERCENT)
+    if in_percent and role in (*LEVELS, *RATES):
+        yield f"with 'signals: engineering' the {role.value.replace('-', ' ')} is in '{unit.name.replace('%', 'eu')}'"
+
+
+def reject_mixed_degrees(variant: Variant) -> Iterator[Problem]:
+    """A controller that computes in degrees computes in one kind of them."""
+    if variant.equation.signals != "engineering":
+        return
+    first: tuple[str, Unit] | None = None
+    for name, setting in variant.equation.settings.items():
+        try:
+            unit = parse_unit(setting.unit)
+        except UnitError:  # has a rule of its own
+            continue
+        if unit.degree is not None and first is not None and unit.degree != first[1].degree:
+            message = f"'{unit.name}', but '{first[0]}' is in '{first[1].name}'; the signals are in one of them"
+            yield variant.card.document.problem(variant.home(("settings", name, "unit")), message)
+        elif unit.degree is not None and first is None:
+            first = name, unit
 
 
 def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
@@ -96,8 +130,8 @@ def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
     """The default scan interval is a time above zero."""
     try:
         number, unit = parse_quantity(variant.equation.scan.default)
-        if unit is None or unit.dimension is not Dimension.TIME or not 0 < number < math.inf:
-            raise PidemuError(f"'{variant.equation.scan.default}' is no time; write it like '1 s'")
+        if unit is None or unit.dimension is not Dimension.TIME or unit.scans or not 0 < number < math.inf:
+            raise PidemuError(f"'{variant.equation.scan.default}' is not a time; write it like '1 s'")
     except PidemuError as error:
         yield variant.card.document.problem(variant.home(("scan", "default")), str(error))
 
@@ -153,7 +187,7 @@ def reject_bad_references(variant: Variant) -> Iterator[Problem]:
 
 def _wrong_number(field: str, role: str, x: float) -> str | None:
     """Return what is wrong with a number that stands where a setting's name could."""
-    if role == "integral-limit":
+    if role in ("integral-limit", "windup-limit"):
         return f"{field} is {x:g}; it is a number" if math.isnan(x) else None
     if not 0 <= x < math.inf and role != "filter-factor":  # which has a rule of its own
         return f"{field} is {x:g}; it is a number from 0 up"
@@ -192,8 +226,14 @@ def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, f"a lead-lag belongs to the series form, this is '{equation.form.value}'", at_key=True)
     if filt.order == 2 and filt.applies_to != "measurement":
         yield document.problem(home, "a filter of order 2 is defined for the measurement only", at_key=True)
-    if filt.of == "effective-derivative" and filt.time is not None:
+    if filt.of != "derivative" and filt.time is not None:
         yield document.problem(home, "'of' refers to ratio or gain, not to time", at_key=True)
+    parallel = equation.form == "parallel"
+    if filt.of == "derivative-time" and parallel and equation.proportional.on == "none":
+        yield document.problem((*home, "of"), "'derivative-time' is kd/kp, and this card has no proportional term")
+    if filt.of == "effective-derivative" and parallel and equation.derivative.on != "none":
+        message = "'effective-derivative' is of a series or standard form; of a parallel one, kd/kp is 'derivative-time'"
+        yield document.problem((*home, "of"), message)
     if filt.rule is not None and filt.applies_to in ("term", "lead-lag"):
         message = "'rule' here is that of a filter on measurement or output; the term's is 'derivative.rule'"
         yield document.problem((*home, "rule"), message)
@@ -207,9 +247,6 @@ def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
     if scheme == "external-reset" and equation.integral.rule is Rule.TRAPEZOIDAL:
         yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
-    if scheme == "external-reset" and equation.integral.on != "none" and equation.proportional.on != "error":
-        message = "external-reset needs P on the error: positive feedback of another P settles beyond the limit"
-        yield document.problem(home, message, at_key=True)
     if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
         place = variant.home(("proportional", "accumulated"))
         yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
@@ -246,6 +283,7 @@ def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
 
 RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_units,
+    reject_mixed_degrees,
     reject_bad_numbers,
     reject_unexplained_defaults,
     reject_bad_scan,

@@ -4,19 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Final
 
+from pidemu.algorithm import Algorithm
+from pidemu.card.base import Form, Status
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.models import Canonical
 from pidemu.card.references import is_active
+from pidemu.card.source import Path_
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
+from pidemu.scan.build import build
 from pidemu.settings import Settings, limits, off_values
+from pidemu.targets.python import compiled
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
 """Examples are printed with six digits."""
 _AT_REST: Final = 300
 """Scans at rest before the step of an example."""
+_ERROR: Final = 7.31
+"""A constant error [%] that P alone does not reach a limit with, at a gain of 1."""
+_INCREMENT: Final = 0.317
+"""What it moves the integral by in one scan [%]; no whole number of them reaches a limit."""
+_CONSTANT: Final = 1000
+"""Scans for which the error stays: five times what reaching the limit takes."""
 
 
 def reject_wrong_examples(card: Card) -> Iterator[Problem]:
@@ -80,6 +92,48 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
             yield card.document.problem(("options",) if chosen else ("settings",), message)
 
 
+def reject_windup_that_stops_short(card: Card) -> Iterator[Problem]:
+    """Under a constant error the output reaches its limit, unless a source says that on the real thing it does not."""
+    seen: set[Path_] = set()
+    for variant in variants(card):
+        home = variant.home(("integral", "windup"))
+        evidence = card.data.evidence.get(card.evidence_key(home) or "")
+        proven = evidence is not None and evidence.status in (Status.DOCUMENTED, Status.MEASURED)
+        if proven or home in seen or variant.equation.form is Form.DAHLIN:
+            continue
+        try:
+            reached = farthest(plausible(variant).algorithm())
+        except PidemuError:
+            continue  # not defined, or refused by another rule
+        if reached is not None and reached != (0.0, 100.0):
+            seen.add(home)
+            message = (
+                f"under a constant error the output stays at {reached[1]:.4g} % and never reaches its limit; only what is "
+                "documented or measured may do that"
+            )
+            yield card.document.problem(home, message, at_key=True)
+
+
+def farthest(algorithm: Algorithm) -> tuple[float, float] | None:
+    """Return the outputs that constant errors of either sign lead to, with limits of 0 and 100 %; ``None`` without integral.
+
+    The error is so small that P does not reach the limit by itself; what filters signals, and the derivative, are left out.
+    """
+    if not algorithm.ki:
+        return None
+    per_gain = 1 / abs(algorithm.kp) if algorithm.kp else 1.0
+    kp, ki = algorithm.kp * per_gain, algorithm.ki * per_gain
+    bare = replace(algorithm.linear, kp=kp, ki=ki, kd=0.0, Tf=0.0, sp_filter=None, pv_filter=None, e_filter=None)
+    h = _INCREMENT / (_ERROR * abs(ki))
+    run = compiled(program := build(bare, h, limits=(0.0, 100.0), initial_output=50.0)).run
+    ends = []
+    for error in (-_ERROR, _ERROR):
+        sp = [50.0, *[50.0 + math.copysign(error, error * ki)] * _CONSTANT]
+        n = len(sp)
+        ends.append(float(run(list(program.initial), sp, [50.0] * n, [1.0] * n, [math.nan] * n)[-1]))
+    return ends[0], ends[1]
+
+
 def plausible(variant: Variant) -> Settings:
     """Return settings with every term of the variant at work."""
     values: dict[str, object] = dict(variant.chosen)
@@ -98,4 +152,8 @@ def working(low: float, high: float) -> float:
     return (low + high) / 2 if math.isfinite(low) else high - abs(high) - 1
 
 
-RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (reject_wrong_examples, reject_unrunnable)
+RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
+    reject_wrong_examples,
+    reject_unrunnable,
+    reject_windup_that_stops_short,
+)

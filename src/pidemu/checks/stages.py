@@ -37,12 +37,15 @@ def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_setpoint(variant: Variant) -> Iterator[Problem]:
-    """Only a limited setpoint starts somewhere else than at the setpoint."""
+    """Only a limited setpoint starts elsewhere than at the setpoint, falls at a rate of its own, or is limited in some modes."""
     setpoint = variant.equation.setpoint
     if setpoint is not None and setpoint.starts == "zero" and setpoint.rate is None:
         yield variant.card.document.problem(
             variant.home(("setpoint", "starts")), "'starts: zero' belongs to a setpoint with a 'rate'"
         )
+    if setpoint is not None and setpoint.rate is None and (setpoint.rate_down is not None or setpoint.rate_counts != "always"):
+        message = "'rate-down' and 'rate-counts' belong to a setpoint with a 'rate'"
+        yield variant.card.document.problem(variant.home(("setpoint",)), message, at_key=True)
 
 
 def reject_bad_error(variant: Variant) -> Iterator[Problem]:
@@ -139,11 +142,13 @@ def _wrong_gate(w: WindupGate, rule: Rule) -> Iterator[str]:
     if w.scheme == "conditional":
         if (w.judged_on, w.direction, w.resumes_from) != ("output", "further", "last"):
             yield "'judged-on', 'direction' and 'resumes-from' belong to 'freeze'"
+        if w.last_increment == "dropped" and rule is Rule.FORWARD:
+            yield "'last-increment' has no meaning under the forward rule, whose increment comes after the output"
+        if w.test == "error-times-output" and w.last_increment != "dropped" and rule is not Rule.FORWARD:
+            yield "'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'"
         return
-    if w.test != "increment":
-        yield "'test' belongs to 'conditional'"
-    if w.direction == "both" and w.judged_on != "sum" and w.fast_return != 1:
-        yield "'fast-return' has no meaning with 'direction: both', which stops the way back as well"
+    if (w.test, w.last_increment) != ("increment", "to-the-limit"):
+        yield "'test' and 'last-increment' belong to 'conditional'"
     if w.resumes_from != "last" and rule is not Rule.TRAPEZOIDAL:
         yield "'resumes-from' belongs to the trapezoidal rule"
     if w.judged_on == "sum" and rule is Rule.FORWARD:
@@ -161,7 +166,7 @@ def _wrong_tracking(w: WindupBackCalculation, equation: Equation) -> Iterator[st
     elif isinstance(given, float) and w.when_off is not None:
         yield "'when-off' goes with a setting under 'tracking-time'"
     setting = equation.settings.get(given) if isinstance(given, str) else None
-    if setting is None or setting.sets != "tracking-time" or setting.unit not in ("1", "s", "min", "h", "ms"):
+    if setting is None or setting.sets != "tracking-time" or setting.unit not in ("1", "s", "min", "h", "ms", "scan"):
         return
     ratio = parse_unit(setting.unit).dimension is Dimension.RATIO
     if ratio and w.times is None:

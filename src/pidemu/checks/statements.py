@@ -10,7 +10,7 @@ from pidemu.card.base import Status
 from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
 from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
-from pidemu.settings import RESERVED
+from pidemu.ranges import RANGES
 
 
 def reject_wrong_folder(card: Card) -> Iterator[Problem]:
@@ -64,6 +64,15 @@ def reject_incomplete_evidence(card: Card) -> Iterator[Problem]:
             yield card.document.problem(("evidence", key), f"'{e.status.value}' needs '{name}'", at_key=True)
 
 
+def reject_proof_from_another_product(card: Card) -> Iterator[Problem]:
+    """What a source says of another product is no more than a reason to infer the same of this one."""
+    for key, e in card.data.evidence.items():
+        source = card.data.sources.get(e.source or "")
+        if e.status in (Status.DOCUMENTED, Status.MEASURED) and source is not None and source.product is not None:
+            message = f"'{e.source}' is about {source.product}, which does not make this {e.status.value}; write 'inferred' and why"
+            yield card.document.problem(("evidence", key, "status"), message)
+
+
 def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
     """An evidence path leads to something in the card."""
     known = {dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1)}
@@ -105,7 +114,7 @@ def reject_ambiguous_names(card: Card) -> Iterator[Problem]:
     seen: dict[str, str] = {}
     for name in [*card.all_settings(), *card.data.options]:
         path = ("options", name) if name in card.data.options else ("settings", name)
-        if name in RESERVED:
+        if name in RANGES:
             yield card.document.problem(path, f"'{name}' is reserved for the signal range", at_key=True)
         if name.casefold() in seen:
             yield card.document.problem(path, f"'{name}' and '{seen[name.casefold()]}' cannot be told apart", at_key=True)
@@ -117,6 +126,7 @@ RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
     reject_dangling_sources,
     reject_unused_sources,
     reject_incomplete_evidence,
+    reject_proof_from_another_product,
     reject_evidence_for_nothing,
     reject_fields_without_evidence,
     reject_overlapping_options,

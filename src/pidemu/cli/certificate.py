@@ -17,7 +17,7 @@ from pidemu.certificate.figures import (
     rounding_line,
     unit_of,
 )
-from pidemu.certificate.models import LoopComparison
+from pidemu.certificate.models import EXACT, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
 from pidemu.conversion.document import refusal_document
 from pidemu.conversion.explain import explained
@@ -26,7 +26,9 @@ from pidemu.conversion.statement import (
     bump_line,
     chosen_line,
     figure_lines,
+    lag_line,
     pace_line,
+    proof_lines,
     ranges_line,
     sections,
     side_title,
@@ -57,7 +59,8 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     for name, value in nearest.settings.items():
         if value.active:
             click.echo(f"  {name} = {number(value.value)} {unit_of(value)}".rstrip(), err=True)
-    click.echo(f"their cost: up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band", err=True)
+    cost = f"up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)}" if band.max_deviation >= EXACT else "none"
+    click.echo(f"their cost in the loop band: {cost}", err=True)
 
 
 def print_conversion(c: Conversion) -> None:
@@ -72,6 +75,11 @@ def print_conversion(c: Conversion) -> None:
     _figures(c)
     if c.certificate.loop is not None:
         _loop(c.certificate.loop)
+    proof = proof_lines(c)
+    if proof:
+        heading("\nProof")
+    for line in proof:
+        wrapped(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
 
 
 def print_plan(plan: TransferPlan) -> None:
@@ -109,7 +117,7 @@ def _target(c: Conversion) -> None:
     if c.chosen:
         wrapped(f"{chosen_line(c)} (--set to change, --explain for why)", "  ")
     table(["", f"{c.match} match", "", "", "textbook rule"], [row.cells for row in target_rows(c)], right=(1, 4))
-    for line in filter(None, (ranges_line(c.settings), rounding_line(c.certificate, c.request.digits))):
+    for line in filter(None, (lag_line(c.settings), ranges_line(c.settings), rounding_line(c.certificate, c.request.digits))):
         wrapped(line, "  ")
 
 

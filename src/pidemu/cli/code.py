@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -12,6 +13,8 @@ from pidemu.cli.common import action_option, assignments, limits_option, vendors
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
 from pidemu.scan.program import Program
+from pidemu.settings import Settings
+from pidemu.unverified import facts, unverified_program
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
@@ -35,7 +38,10 @@ def command(
     limits: tuple[float, float] | None,
     vendors: tuple[str, ...],
 ) -> None:
-    """Print what CARD with the settings NAME=VALUE does in one scan, as a module that runs on its own."""
+    """Print what CARD with the settings NAME=VALUE does in one scan, as a module that runs on its own.
+
+    The comment at the top names what the program rests on and no source of the card states: rules, windup, transfer, limits.
+    """
     from pidemu.targets.c import check_name
 
     if name is not None and lang == "python" and out is None:
@@ -45,12 +51,21 @@ def command(
     loaded = load_card(card, vendors)
     settings = loaded.settings(assignments(values))
     program = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits).program
+    notes = _notes(settings, scan=scan is not None, limits=limits is not None)
     name = name or _name(loaded.id)
     if out is None:
-        click.echo(_printed(program, lang, name), nl=False)
+        click.echo(_printed(program, lang, name, notes), nl=False)
         return
-    for file, text in _files(program, lang, name).items():
+    for file, text in _files(program, lang, name, notes).items():
         _write(Path(out) / file, text)
+
+
+def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
+    """Return what the comment at the top says of the card's evidence."""
+    found = facts(unverified_program(settings, scan=scan, limits=limits))
+    if not found:
+        return [f"Every field of the card {settings.card.id} that makes this program is documented or measured."]
+    return [f"Assumed or inferred in the card {settings.card.id}, and at work here:", *(f"- {fact}" for fact in found)]
 
 
 def _name(card_id: str) -> str:
@@ -59,22 +74,22 @@ def _name(card_id: str) -> str:
     return name if name[:1].isalpha() else f"pid_{name}"
 
 
-def _printed(program: Program, lang: str, name: str) -> str:
+def _printed(program: Program, lang: str, name: str, notes: Sequence[str]) -> str:
     if lang == "c":
         from pidemu.targets.c import single
 
-        return single(program, name)
+        return single(program, name, notes)
     from pidemu.targets.python import source
 
-    return source(program)
+    return source(program, notes)
 
 
-def _files(program: Program, lang: str, name: str) -> dict[str, str]:
+def _files(program: Program, lang: str, name: str, notes: Sequence[str]) -> dict[str, str]:
     if lang == "c":
         from pidemu.targets.c import header, source
 
-        return {f"{name}.h": header(program, name), f"{name}.c": source(program, name)}
-    return {f"{name}.py": _printed(program, lang, name)}
+        return {f"{name}.h": header(program, name, notes), f"{name}.c": source(program, name, notes)}
+    return {f"{name}.py": _printed(program, lang, name, notes)}
 
 
 def _write(path: Path, text: str) -> None:

@@ -19,15 +19,17 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.engines import ENGINES, Engine
 from pidemu.errors import RecordError, SettingError
+from pidemu.ranges import SignalRange, read_range
 from pidemu.words import assignments as assignments  # noqa: PLC0414
 from pidemu.words import pair, seconds, step
 
 if TYPE_CHECKING:
     _PairType = click.ParamType[tuple[float, float]]
+    _RangeType = click.ParamType[SignalRange]
     _TimeType = click.ParamType[float]
     _StepType = click.ParamType[float | tuple[float, float]]
 else:
-    _PairType = _TimeType = _StepType = click.ParamType  # it has no type parameter before click 8.4
+    _PairType = _RangeType = _TimeType = _StepType = click.ParamType  # it has no type parameter before click 8.4
 
 vendors_option = click.option(
     "--vendors",
@@ -49,6 +51,19 @@ class Pair(_PairType):
             return value
         try:
             return pair(str(value))
+        except SettingError as error:
+            self.fail(str(error), param, ctx)
+
+
+class Range(_RangeType):
+    """A signal range with its unit, such as ``0,400 degC``."""
+
+    name = "LOW,HIGH UNIT"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> SignalRange:
+        """Read the range."""
+        try:
+            return read_range(value)
         except SettingError as error:
             self.fail(str(error), param, ctx)
 

@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
-from pidemu.cli.common import Pair, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.common import Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import ActionError, ConversionRefusedError, QuestionError, SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
@@ -87,11 +89,12 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     show_default=True,
     help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
 )
+@click.option("--bias", type=float, help="Output at SP = PV of a loop without integral action [%].")
 @click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
-@click.option("--pv-range", type=Pair(), help="Measurement range of the source [engineering units].")
-@click.option("--op-range", type=Pair(), help="Output range of the source [engineering units].")
-@click.option("--to-pv-range", type=Pair(), help="Measurement range of the target; by default the source's.")
-@click.option("--to-op-range", type=Pair(), help="Output range of the target; by default the source's.")
+@click.option("--pv-range", type=Range(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
+@click.option("--op-range", type=Range(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
+@click.option("--to-pv-range", type=Range(), help="Measurement range of the target; by default the source's.")
+@click.option("--to-op-range", type=Range(), help="Output range of the target; by default the source's.")
 @click.option(
     "--cut-over", "now", metavar="SP,PV,OP", help="Setpoint, measurement and output now: how to change over without a bump."
 )
@@ -128,11 +131,12 @@ def command(
     assume: bool,
     allow_approximate: bool,
     digits: int,
+    bias: float | None,
     tag: str,
-    pv_range: tuple[float, float] | None,
-    op_range: tuple[float, float] | None,
-    to_pv_range: tuple[float, float] | None,
-    to_op_range: tuple[float, float] | None,
+    pv_range: SignalRange | None,
+    op_range: SignalRange | None,
+    to_pv_range: SignalRange | None,
+    to_op_range: SignalRange | None,
     now: str | None,
     action: str | None,
     date: datetime.date | None,
@@ -150,6 +154,7 @@ def command(
         values, card = (card, *values), None  # what stands first is a value then
     given = assignments(values)
     wanted = assignments(fixed, "NAME=VALUE after --set")
+    loop = None
     if loop_file is not None:
         from pidemu.conversion.loopfile import read_loop
 
@@ -164,14 +169,19 @@ def command(
         )
     if target is None:
         raise click.UsageError("no card to convert to; add --to CARD, 'pidemu cards' lists them")
+    to_ranges: dict[str, SignalRange | str | None] = {"to_pv_range": to_pv_range, "to_op_range": to_op_range}
+    if loop is not None:
+        to_ranges = {"to_pv_range": to_pv_range or loop.to_pv_range, "to_op_range": to_op_range or loop.to_op_range}
     ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
     goal = load_card(target, vendors)
     options, dials = split_options(goal, wanted)
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "runs_every": runs_every, "compensate": compensate, "mode": mode,
-        "action": action, "match": match, "digits": digits, "to_pv_range": to_pv_range, "to_op_range": to_op_range,
-        "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
+        "action": action, "match": match, "digits": digits, **to_ranges,
+        "bias": bias, "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
     }  # fmt: skip
+    if loop is not None:
+        arguments |= {name: value for name, value in loop.others.items() if not _was_given(name)}
     if process is not None:
         from pidemu.loop.process import parse_process
 
@@ -180,14 +190,7 @@ def command(
         source = _only_reading(word, {**given, **ranges}, goal, arguments, target, vendors, as_json)
     else:
         source = load_card(card or "", vendors).settings({**given, **ranges})
-    try:
-        conversion = convert(source, goal, **arguments)
-    except QuestionError as error:
-        print_questions(error, source, goal.id, as_json)
-        raise SystemExit(1) from None
-    except ConversionRefusedError as error:
-        print_refusal(error, source, goal, as_json)
-        raise SystemExit(1) from None
+    conversion = _converted(source, goal, arguments, as_json)
     plan, not_known = _plan(conversion, now)
     if page is not None:
         from pidemu.report.certificate import write_page
@@ -196,16 +199,36 @@ def command(
     if as_json:
         print_json({**conversion.to_dict(date), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
     else:
-        print_conversion(conversion)
-        if plan is not None:
-            print_plan(plan)
-        if explain:
-            print_explanation(conversion)
-        if page is not None:
-            click.echo(f"\nwritten: {page}")
+        _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:
         click.echo(f"error: {not_known}", err=True)
         raise SystemExit(1)
+
+
+def _was_given(name: str) -> bool:
+    """Whether an option stands on the command line, so that it counts before the loop file's."""
+    return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
+
+
+def _converted(source: Settings, goal: Card, arguments: dict[str, Any], as_json: bool) -> Conversion:
+    """Return the conversion; a question or a refusal is printed, and ends the command."""
+    try:
+        return convert(source, goal, **arguments)
+    except QuestionError as error:
+        print_questions(error, source, goal.id, as_json)
+    except ConversionRefusedError as error:
+        print_refusal(error, source, goal, as_json)
+    raise SystemExit(1)
+
+
+def _print(conversion: Conversion, plan: TransferPlan | None, *, explain: bool, page: str | None) -> None:
+    print_conversion(conversion)
+    if plan is not None:
+        print_plan(plan)
+    if explain:
+        print_explanation(conversion)
+    if page is not None:
+        click.echo(f"\nwritten: {page}")
 
 
 def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:

@@ -25,13 +25,15 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.fleet.fleet import Fleet
-from pidemu.fleet.result import RAN, FleetResult
+from pidemu.fleet.judgement import MARGINS, RAN
+from pidemu.fleet.result import FleetResult
 from pidemu.fleet.table import LoopTable, read_loops
 from pidemu.plain import json_safe
 
 _ROWS: Final = 20
 """Loops that are shown; a plant has thousands."""
 _COLUMNS: Final = ("tag", "card", "scan", "IAE [% s]", "peak [%]", "travel [%]", "at limits [s]", "error [%]")
+_MARGINS: Final = ("GM", "PM [deg]", "Ms")
 
 
 @click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
@@ -40,6 +42,7 @@ _COLUMNS: Final = ("tag", "card", "scan", "IAE [% s]", "peak [%]", "travel [%]",
 @setpoint_option
 @load_option
 @engine_option
+@click.option("--margins/--no-margins", default=True, help="Compute margins and stability, which takes about as long as the run.")
 @click.option("--cores", type=click.IntRange(min=1), metavar="N", help="Threads on this machine; by default one per core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: its scheduler's address, such as tcp://HOST:8786.")
 @click.option("--table", "target", metavar="FILE.csv", help="Write the table: a row per loop.")
@@ -55,6 +58,7 @@ def command(
     setpoint: float | tuple[float, float] | None,
     load: float | tuple[float, float] | None,
     engine: str | None,
+    margins: bool,
     cores: int | None,
     scheduler: str | None,
     target: str | None,
@@ -72,7 +76,8 @@ def command(
     others: it is reported, and the exit status is 1.
 
     Shown are the largest absolute error (peak) and its integral (IAE), from the load step on or from the start where there is none;
-    how far the output travelled, how long it was at its limits, and the last error.
+    how far the output travelled, how long it was at its limits, the last error, and gain margin, phase margin and Ms of the sampled
+    loop within its limits. A loop has settled where the error moves over less than 5 % of its peak in the last fifth of the run.
     """
     if scheduler is not None and cores is not None:
         raise click.UsageError("--cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out")
@@ -85,8 +90,8 @@ def command(
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(
-            time=time, folder=signals, parquet=parquet, engine=asked_for(engine), cores=cores, cluster=scheduler,
-            progress=progress, **given(setpoint=setpoint, load=load),
+            time=time, folder=signals, parquet=parquet, engine=asked_for(engine), margins=margins, cores=cores,
+            cluster=scheduler, progress=progress, **given(setpoint=setpoint, load=load),
         )  # fmt: skip
     if target is not None:
         loops.write(target, result)
@@ -118,12 +123,18 @@ def _plain(loops: LoopTable, rows: Sequence[Mapping[str, Any]], result: FleetRes
     plain = {
         "file": loops.path,
         "counts": Counter(row["status"] for row in rows),
+        "not_settled": _not_settled(rows),
         "engines": _engines(rows),
         "interrupted": result is not None and result.interrupted,
         "loops": rows,
     }
     safe: dict[str, Any] = json_safe(plain)
     return safe
+
+
+def _not_settled(rows: Sequence[Mapping[str, Any]]) -> int:
+    """Return how many loops ran and had not settled at the end."""
+    return sum(row["settled"] is False for row in rows)
 
 
 def _engines(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
@@ -134,7 +145,8 @@ def _engines(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool) -> None:
     counts = Counter(row["status"] for row in rows)
     said = ", ".join(f"{counts[status]:,} {status}" for status in (*RAN, "failed", "not run") if counts[status])
-    heading(f"{loops.path}: {_loops(len(rows))}, {said}")
+    moving = _not_settled(rows)
+    heading(f"{loops.path}: {_loops(len(rows))}, {said}" + (f"; {moving:,} not settled at the end" if moving else ""))
     if engines:
         used = ", ".join(f"{name} ({_loops(count)})" for name, count in _engines(rows).items())
         click.echo(f"engine: {used or 'none, as nothing was run'}")
@@ -142,8 +154,11 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
     if ran:
         heading(f"\nThe {_ROWS} loops with the largest IAE" if len(ran) > _ROWS else "\nLoops, the largest IAE first")
         worst = sorted(ran, key=_badness, reverse=True)[:_ROWS]
-        away = [""] if any(row["status"] == "ran away" for row in worst) else []
-        table([*_COLUMNS, *away], [_cells(row)[: len(_COLUMNS) + len(away)] for row in worst], right=range(2, len(_COLUMNS)))
+        columns = [*_COLUMNS, *(_MARGINS if any(row["Ms"] is not None for row in worst) else ())]
+        remarks = [_remark(row) for row in worst]
+        last = [""] if any(remarks) else []
+        cells = [[*_cells(row)[: len(columns)], said][: len(columns) + len(last)] for row, said in zip(worst, remarks, strict=True)]
+        table([*columns, *last], cells, right=range(2, len(columns)))
     failed = [row for row in rows if row["status"] == "failed"]
     if failed:
         heading("\nFailed")
@@ -153,9 +168,17 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
-    """Return a row of the table for people; what ran away says so at its end."""
-    figures = map(_figure, (row["iae"], row["peak"], row["travel"], row["at_low"] + row["at_high"], row["error"]))
-    return [row["tag"], row["card"], f"{number(row['scan'])} s", *figures, "ran away" if row["status"] == "ran away" else ""]
+    """Return a row of the table for people."""
+    figures = (row["iae"], row["peak"], row["travel"], row["at_low"] + row["at_high"], row["error"])
+    margins = (math.nan if row[name] is None else row[name] for name in MARGINS)
+    return [row["tag"], row["card"], f"{number(row['scan'])} s", *map(_figure, (*figures, *margins))]
+
+
+def _remark(row: Mapping[str, Any]) -> str:
+    """Return what is wrong with a loop that ran."""
+    if row["status"] != "done":
+        return str(row["status"])
+    return "" if row["settled"] else "not settled"
 
 
 def _loops(count: int) -> str:
@@ -163,7 +186,7 @@ def _loops(count: int) -> str:
 
 
 def _badness(row: Mapping[str, Any]) -> float:
-    """Return the IAE; one that ran away is worse than any."""
+    """Return the IAE; a loop that is unstable or ran away is worse than any."""
     iae = float(row["iae"])
     return iae if math.isfinite(iae) and row["status"] == "done" else math.inf
 

@@ -79,9 +79,10 @@ def _how_far(far: Apart) -> str:
 
 def _request_words(goal: Card, arguments: Mapping[str, Any]) -> list[str]:
     """Return what else was asked of the conversion as words of the command line."""
-    ranges = {"pv_range": arguments.get("to_pv_range"), "op_range": arguments.get("to_op_range")}
     asked = {
         "options": None, "given": None, "scan": None, "runs_every": None, "mode": "both", "action": None, "match": None,
-        "process": None, "digits": None, "compensate": False, "allow_approximate": False, "assume": False, "tag": "",
+        "to_pv_range": None, "to_op_range": None, "process": None, "digits": None, "bias": None, "compensate": False,
+        "allow_approximate": False, "assume": False, "tag": "",
     }  # fmt: skip
-    return list(read_request(goal, **{**asked, **{n: x for n, x in arguments.items() if n in asked}, **ranges}).words())
+    given = {n: x for n, x in arguments.items() if n in asked}
+    return list(read_request(goal, **{**asked, **given}).words())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import click
@@ -18,8 +18,25 @@ from pidemu.card.load import EMULATION, Card, Variant
 from pidemu.card.models import Example, Setting
 from pidemu.card.references import is_active
 from pidemu.card.text import equation_heading, equation_lines
-from pidemu.cli.common import assignments, heading, json_option, number, print_json, vendors_option, wrapped
+from pidemu.cli.common import (
+    Range,
+    Time,
+    assignments,
+    heading,
+    json_option,
+    number,
+    print_json,
+    split_options,
+    vendors_option,
+    wrapped,
+)
+from pidemu.cli.common import given as given_ranges
+from pidemu.errors import SettingError, suggest
+from pidemu.explanation.explain import explain
+from pidemu.explanation.model import Explanation
+from pidemu.explanation.text import sections, table_lines
 from pidemu.plain import json_safe
+from pidemu.ranges import RANGES, SignalRange
 from pidemu.settings import off_values
 
 _WIDTH: Final = 110
@@ -28,15 +45,42 @@ _LEAST: Final = 36
 _COLOUR: Final = {"assumed": "yellow", "inferred": "cyan", "documented": "green", "measured": "green"}
 
 
-@click.command("show", short_help="Show a card as a data sheet, with its evidence.")
+@click.command("show", short_help="Show a card as a data sheet; or what its settings mean.")
 @click.argument("card")
-@click.argument("options", nargs=-1, metavar="[OPTION=CHOICE]...")
+@click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
+@click.option("--scan", type=Time(), help="Scan interval [s]: kicks and noise gain at it, too.")
+@click.option("--pv-range", type=Range(), help='Range of the measurement, such as "0,400 degC".')
+@click.option("--op-range", type=Range(), help='Range of the output, such as "0,100 %".')
 @vendors_option
 @json_option
-def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> None:
-    """Show CARD (an id such as fisher/provox, or a file) with the options chosen: equation, settings, evidence, what is assumed."""
+def command(
+    card: str,
+    values: tuple[str, ...],
+    scan: float | None,
+    pv_range: SignalRange | None,
+    op_range: SignalRange | None,
+    vendors: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Show CARD, an id such as fisher/provox or a file: what its settings NAME=VALUE mean, or its data sheet.
+
+    With settings: gain, integral and derivative time in parallel, standard and series form and in the usual units, filters, which
+    terms see the setpoint, kicks and noise gain, the action by the error formula, what was not stated, what the figures rest on.
+
+    Without settings, or with options alone (FORM=Series): the data sheet with equation, settings, evidence and what is assumed.
+    """
     found = load_card(card, vendors)
-    variant = found.variant(assignments(options, "OPTION=CHOICE", "FORM=Series"))
+    given = {**assignments(values), **given_ranges(pv_range=pv_range, op_range=op_range)}
+    options, dials = split_options(found, given)
+    _refuse_unknown(found, dials)
+    if dials or scan is not None:
+        explained = explain(found.settings(given), scan)
+        if as_json:
+            print_json(explained.to_dict())
+        else:
+            _explained(explained)
+        return
+    variant = found.variant(options)
     if as_json:
         print_json(_plain(variant))
         return
@@ -53,6 +97,27 @@ def command(card: str, options: tuple[str, ...], vendors: tuple[str, ...], as_js
     _settings(variant)
     _evidence(variant)
     _rest(found)
+
+
+def _refuse_unknown(card: Card, dials: Mapping[str, object]) -> None:
+    """Refuse names that are neither settings nor options, since what is shown depends on which they are."""
+    known = [*card.all_settings(), *card.options]
+    folded = {name.casefold() for name in (*known, *RANGES)}
+    wrong = [name for name in dials if name.casefold() not in folded]
+    if wrong:
+        which = ", ".join(f"'{name}'{suggest(name, known)}" for name in wrong)
+        settings, options = (", ".join(names) or "none" for names in (card.all_settings(), card.options))
+        raise SettingError(f"{card.id}: unknown setting or option {which}; settings: {settings}; options: {options}")
+
+
+def _explained(e: Explanation) -> None:
+    """Print an explanation, its headings in bold on a terminal."""
+    title, *_ = e.text.split("\n\n", 1)
+    heading(title)
+    for name, rows in sections(e):
+        heading(f"\n{name}")
+        for line in table_lines(rows):
+            click.echo(line)
 
 
 def _sheet(rows: Sequence[Sequence[str]], columns: Sequence[str] = ()) -> None:

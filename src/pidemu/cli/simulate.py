@@ -29,9 +29,8 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.engines import Choice, checked
-from pidemu.errors import ProcessError
 from pidemu.fleet.blocks import COLUMNS, figures_of
-from pidemu.loop.figures import loop_figures
+from pidemu.loop.outcome import has_settled, margins_of, stability_of
 from pidemu.loop.process import parse_process
 from pidemu.loop.simulation import run_trial
 from pidemu.loop.trial import Step, Trial, trial
@@ -46,6 +45,7 @@ _NAMES: Final = {
     "travel": "travel of the output",
     "at_low": "at the low limit",
     "at_high": "at the high limit",
+    "swing": "error moves at the end over",
     "error": "last error",
 }
 _MARGINS: Final = {
@@ -99,8 +99,8 @@ def command(
 ) -> None:
     """Run CARD with the settings NAME=VALUE in a closed loop with a process, from rest at 50 %, and print its figures.
 
-    Errors count from the load step on, or from the start where there is none. The margins are those of the sampled loop within
-    its limits.
+    Errors count from the load step on, or from the start where there is none. The measurement has settled where the error moves
+    over less than 5 % of its largest value in the last fifth of the run. The margins are those of the sampled loop within limits.
     """
     settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
@@ -111,33 +111,26 @@ def command(
         with opened(target) as stream:
             write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
     figures = figures_of(made, pv, out)
-    margins = loop_figures(settings.law(made.scan), process) if _is_negative(made, kind) else None
+    margins = margins_of(made)
     if as_json:
         print_json(_plain(made, choice, figures, margins))
     else:
         _print(made, choice if engine else None, figures, margins)
-    for note in (*settings.notes, *_notes(made, kind, margins)):
+    for note in (*settings.notes, *_notes(made, kind, margins, has_settled(figures["swing"], figures["peak"]))):
         click.echo(f"note: {note}", err=True)
 
 
-def _is_negative(made: Trial, action: Action | None) -> bool:
-    """Tell whether the feedback is negative; what is not given is chosen so that it is."""
-    if action is None:
-        return True
-    try:
-        chosen = trial(made.settings, made.process, made.scan, time=made.scans * made.scan, output_limits=made.limits)
-    except ProcessError:  # no choice of action, and the wrong sign
-        return False
-    return chosen.action == made.action or made.settings.equation.action.fixed
-
-
-def _notes(made: Trial, action: Action | None, margins: LoopFigures | None) -> Iterator[str]:
+def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool) -> Iterator[str]:
     """Yield what should be known beside the figures."""
     if action == "direct" and made.settings.equation.action.fixed:
         yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
     if margins is None:
         yield "the feedback is positive, so that the loop has no margins; leave --action out, or give the gain the other sign"
-    for what in made.settings.algorithm().too_coarse(made.scan):
+    elif not margins.stable:
+        yield "the loop is unstable: the figures are those of this run only"
+    elif not settled:
+        yield "the measurement had not settled at the end of the run; give a longer --time, or look at the margins"
+    for what in made.settings.algorithm(scan=made.scan).too_coarse(made.scan):
         yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
 
 
@@ -154,6 +147,8 @@ def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: L
         "load": made.load_step,
         "engine": {"name": choice.engine, "reason": choice.reason},
         "figures": dict(figures),
+        "settled": has_settled(figures["swing"], figures["peak"]),
+        "stable": stability_of(made, margins),
         "margins": None if margins is None else {name: getattr(margins, name) for name in ("stable", *_MARGINS.values())},
     }
     safe: dict[str, Any] = json_safe(plain)
@@ -181,7 +176,9 @@ def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], mar
     ]
     table(["", ""], rows)
     heading(f"\nWhat it did, errors from the {'start' if made.load_step is None else 'load step'} on")
-    table(["", "", ""], [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()], right=(1,))
+    settled = "yes" if has_settled(figures["swing"], figures["peak"]) else "NO"
+    rows = [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()]
+    table(["", "", ""], [*rows, ["settled at the end", settled, ""]], right=(1,))
     if margins is not None:
         heading("\nMargins, sampled and within the limits")
         rows = [[name, _short(getattr(margins, attribute))] for name, attribute in _MARGINS.items()]

@@ -4,85 +4,113 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from pidemu.action import action_line
+from pidemu.certificate.figures import number, percent
+from pidemu.certificate.models import Kick
 from pidemu.certificate.noise import noise_change
-from pidemu.units import Role
+from pidemu.conversion.modes import Mode, in_mode
+from pidemu.conversion.spans import range_questions, rescaling, signals_note
+from pidemu.units import Role, parse_unit
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
 
 
 def warnings_for(c: Conversion) -> Iterator[str]:
-    """Yield one sentence per difference.
+    """Yield what to watch for, one sentence or two per difference, what matters most first.
 
     Parameters
     ----------
     c : Conversion
         The conversion, without its warnings.
     """
-    if c.refusal:
-        yield f"these are only the nearest settings: {c.refusal}"
-    yield from _ranges(c)
-    yield from _setpoint(c)
-    yield from _multiplier(c)
-    noise = noise_change(c.source, c.settings, c.scan, c.factor).text
-    if noise:
-        yield noise
-    yield from (difference.text for difference in c.certificate.nonlinear)
-    if c.certificate.not_emulated:
-        yield f"the two were not run against each other: {c.certificate.not_emulated}"
-    yield from _action(c)
-    yield from _scan(c)
+    said = (
+        *([f"These are only the nearest settings: {c.refusal}"] if c.refusal else []),
+        *(d.text for d in c.certificate.nonlinear if d.inside_limits),
+        _lag(c),
+        *_setpoint(c),
+        noise_change(c.source, c.settings, c.scan, c.factor).text,
+        *(
+            d.text
+            for d in c.certificate.nonlinear
+            if not d.inside_limits and not (d.aspect == "bias" and c.request.bias is not None)
+        ),
+        *_ranges(c),
+        *_counted_in_scans(c),
+        *_multiplier(c),
+        *(o.idle for o in c.opens),
+        *([f"The two were not run against each other: {c.certificate.not_emulated}"] if c.certificate.not_emulated else []),
+        *_scan(c),
+    )
+    yield from (_sentence(text) for text in dict.fromkeys(said) if text)
+
+
+def _sentence(text: str) -> str:
+    """Return a text as a sentence: a capital in front where it begins with a plain word, a full stop behind."""
+    first = text.split(maxsplit=1)[0]
+    capital = text[0].upper() + text[1:] if first.isalpha() and first.islower() else text
+    return capital if text.endswith((".", "!")) else f"{capital}."
 
 
 def _ranges(c: Conversion) -> Iterator[str]:
-    if abs(c.factor) != 1:
-        yield (
-            f"the signal ranges change: the percent gain is multiplied by {abs(c.factor):.6g} for the same effect in "
-            "engineering units"
-        )
+    yield from rescaling(c.source, c.request.to_pv_range, c.request.to_op_range).notes
+    for question in range_questions(c.source, c.settings):
+        yield f"{question.text}; 0 to 100 is taken"
+    yield signals_note(c.source, c.settings)
+
+
+def _counted_in_scans(c: Conversion) -> Iterator[str]:
+    """Yield which dials rest on a scan interval that was not given."""
     for s in (c.source, c.settings):
-        if s.equation.signals == "engineering" and (s.pv_range is None or s.op_range is None):
-            yield (
-                f"{s.card.id} computes in engineering units, and not all ranges were given: spans not given are taken as 100; "
-                "give the ranges of measurement and output"
-            )
+        counted = [n for n, v in s.items() if v.active and not v.off and parse_unit(v.unit).scans]
+        if counted and c.request.scan is None:
+            names = ", ".join(counted)
+            yield f"{s.card.id}: {names} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
+
+
+def _lag(c: Conversion) -> str:
+    """Return what to put in front of the new block, where it cannot filter its measurement as the old one does."""
+    if not c.settings.lag:
+        return ""
+    work = c.ranking[0].solver
+    assert work is not None
+    without = percent(work.continuous_deviation(replace(c.settings, lag=0.0)))
+    return (
+        f"The old controller filters PV, the new block cannot: put a first-order lag of {number(c.settings.lag)} s on PV in front "
+        f"of it, as the figures suppose; without it the two differ by {without} in the loop band"
+    )
 
 
 def _setpoint(c: Conversion) -> Iterator[str]:
-    kick = c.certificate.setpoint_kick_at_scan or c.certificate.setpoint_kick
-    if c.certificate.setpoint.is_exact or (c.verdict == "approximate" and _alike(kick.source, kick.target)):
+    """Yield how setpoint changes differ, before and after, and what would make them alike."""
+    if (c.certificate.setpoint_before_rounding or c.certificate.setpoint).is_exact:
         return
-    if math.isinf(kick.source) and math.isinf(kick.target):
-        yield "the response to setpoint changes differs"
-    elif math.isinf(kick.source) or math.isinf(kick.target):
-        who, other = (c.source, kick.target) if math.isinf(kick.source) else (c.settings, kick.source)
+    kick = c.certificate.setpoint_kick
+    mode: Mode = "cascade" if c.request.mode == "cascade" else "auto"
+    old, new = (in_mode(s.algorithm(), mode) for s in (c.source, c.settings))
+    lost, gained = old.kp and old.b and not new.b, new.kp and new.b and not old.b
+    if not _alike(kick):
+        yield f"Setpoint steps: with the old controller the output {_jumps(kick.source)}, with the new one it {_jumps(kick.target)}"
+    if lost:
         yield (
-            f"a setpoint step spikes the output of {who.card.id} for one scan (unfiltered derivative on the error), the other "
-            f"{_jumps(other)}"
-        )
-    elif _alike(kick.source, kick.target):
-        yield "the response to setpoint changes differs after the first moment"
-    else:
-        ratio = f" ({kick.ratio:.3g} times)" if 0 < kick.ratio < math.inf else ""
-        yield f"setpoint steps: the output {_jumps(kick.target)}, on the source it {_jumps(kick.source)}{ratio}"
-    old, new = c.source.algorithm(), c.settings.algorithm()
-    if old.kp and new.kp and bool(old.b) != bool(new.b):
-        yield (
-            "proportional action is on the measurement in one and on the error in the other: no settings make their setpoint "
-            "responses equal; judge that of the loop by simulation, and tune for it"
+            "P acts on the error on the old controller and on the measurement on the new one: setpoint changes will be slower, and "
+            "no filter makes up for it"
         )
     filt = c.setpoint_filter
-    if c.certificate.headline.is_exact and filt is not None:
-        yield f"a setpoint filter {filt} before the target would give the source's setpoint response (times in s)"
-    elif c.certificate.headline.is_exact:
-        yield "no setpoint filter gives the source's setpoint response: it would have to differentiate"
+    if filt is not None and (gained or c.certificate.headline.is_exact):
+        yield f"A setpoint filter {filt} before the new controller gives the old setpoint response (times in s)"
 
 
 def _jumps(kick: float) -> str:
+    if math.isinf(kick):
+        return "spikes for one scan (unfiltered derivative on the error)"
     return f"jumps by {kick:.4g} % per % at once" if kick else "does not jump"
+
+
+def _alike(kick: Kick) -> bool:
+    return kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=0.02)
 
 
 def _multiplier(c: Conversion) -> Iterator[str]:
@@ -91,22 +119,8 @@ def _multiplier(c: Conversion) -> Iterator[str]:
         usual = value.setting.default
         yield (
             f"{value.name} = {value.value:.4g} makes the filter time agree, which goes with the derivative on the dial; "
-            f"'--set {value.name}={usual:g}' keeps it at {usual:g}, with a filter that differs"
+            f"--set {value.name}={usual:g} keeps it at {usual:g}, with a filter that differs"
         )
-
-
-def _alike(x: float, y: float) -> bool:
-    return x == y or math.isclose(x, y, rel_tol=0.02)
-
-
-def _action(c: Conversion) -> Iterator[str]:
-    """Yield what the action is set to, where it is not the same word on both."""
-    old, new = c.source.equation.action, c.settings.equation.action
-    same = {k: v.casefold() for k, v in old.names.items()} == {k: v.casefold() for k, v in new.names.items()}
-    turned = c.factor < 0 and not (old.fixed and new.fixed)
-    if same and not turned and old.fixed == new.fixed:
-        return
-    yield f"action: {c.action_text}; on {c.source.card.id}: {action_line(c.source, c.action)}"
 
 
 def _scan(c: Conversion) -> Iterator[str]:
@@ -116,11 +130,11 @@ def _scan(c: Conversion) -> Iterator[str]:
         yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
     if c.scan[0] != c.scan[1]:
         yield (
-            f"scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: the settings are per second, so do not scale the gain by "
-            "the ratio of the intervals"
+            f"The scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: settings are per second, so do not scale the gain "
+            "by their ratio"
         )
     if c.request.compensate:
         yield (
-            "the settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules "
+            "The settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules "
             "that are often only assumed"
         )

@@ -14,7 +14,9 @@ from pidemu.conversion.modes import depends_on_mode
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.questions import Answer, Question
 from pidemu.conversion.request import DIGITS, Request
+from pidemu.conversion.spans import range_questions, rescaling
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
+from pidemu.range_relation import RangeQuestion
 from pidemu.settings import Settings
 from pidemu.units import Role
 
@@ -74,6 +76,49 @@ def action_questions(source: Settings, request: Request) -> list[Question]:
 
 _SIGNED: Final = {False: (Role.GAIN,), True: (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)}
 """Dials that carry the sign, of a parallel form and of the others."""
+
+
+def scale_questions(source: Settings, request: Request) -> list[Question]:
+    """Return what is not clear of two ranges of one signal: the same signal on another scale, or another range of it."""
+    return [
+        _of_range(
+            source,
+            found,
+            tuple(
+                Answer(
+                    f"{reading.source.argument} to {reading.target.argument}",
+                    reading.text,
+                    given={found.about: reading.source},
+                    asked={f"to_{found.about}": reading.target},
+                )
+                for reading in found.readings
+            ),
+        )
+        for found in rescaling(source, request.to_pv_range, request.to_op_range).questions
+    ]
+
+
+def missing_ranges(source: Settings, settings: Settings) -> list[Question]:
+    """Return what has to be known of ranges that were not given and that would change a dial."""
+    return [
+        _of_range(source, found, (Answer("0 to 100", f"or give it: {found.example}", given={found.about: (0, 100)}),))
+        for found in range_questions(source, settings)
+        if not (found.about == "op_range" and _output_is_percent(source, settings))
+    ]
+
+
+def _output_is_percent(*both: Settings) -> bool:
+    """Whether controllers that compute in engineering units have their output in percent, by the limits that their cards state."""
+    limits = [s.equation.output.limits for s in both if s.equation.signals == "engineering"]
+    return bool(limits) and all(low >= _PERCENT[0] and high <= _PERCENT[1] and high - low >= 100 for low, high in limits)
+
+
+_PERCENT: Final = (-10.0, 110.0)
+"""Between these output limits in percent lie."""
+
+
+def _of_range(source: Settings, found: RangeQuestion, answers: tuple[Answer, ...]) -> Question:
+    return Question(found.kind, found.about, f"{source.card.id}: {found.text}", answers)
 
 
 def mode_is_open(source: Settings, ranking: tuple[Attempt, ...], request: Request) -> bool:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _DIALS: Final = (Role.MULTIPLIER, Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 _NEAR: Final = 0.01
 """Deviation in the loop band below which the source's own numbers stand beside an exact match."""
+_FAR: Final = 0.2
+"""Deviation in the loop band from which settings are not worth a line."""
 _DIGITS: Final = 4
 
 
@@ -31,7 +33,7 @@ class Beside:
 
     Attributes
     ----------
-    kind : {"runner-up", "same-numbers", "matched", "compensated", "unstated"}
+    kind : {"runner-up", "same-numbers", "matched", "absorbed", "compensated", "unstated"}
         What they are.
     text : str
         The settings in one line, with what they cost.
@@ -63,9 +65,11 @@ def runner_up(c: Conversion) -> Beside | None:
         if other.merit is None or other.settings is None or not _is_another(best.settings, other.settings):
             continue
         torn = best.merit.setpoint >= _TORN and other.merit.setpoint >= _TORN  # neither keeps the setpoint path
+        if other.merit.by_number and not best.merit.by_number:
+            continue
         same_class = RANK[other.verdict] <= RANK[best.verdict] and other.merit.setpoint == best.merit.setpoint
         if torn or (same_class and not other.merit.unused and other.merit.nonlinear == best.merit.nonlinear):
-            return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(other))
+            return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(best, other))
         return None
     return None
 
@@ -85,9 +89,10 @@ def _runner_up_text(best: Attempt, other: Attempt) -> str:
     return f"{options}: {verdict}, {_dials(other.settings)}"
 
 
-def _set(other: Attempt) -> str:
+def _set(best: Attempt, other: Attempt) -> str:
     assert other.settings is not None
-    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in other.settings.options.items())
+    chosen = {n: x for n, x in other.settings.options.items() if n in other.changed or n in best.changed}
+    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in chosen.items())
 
 
 def _is_another(a: Settings, b: Settings) -> bool:
@@ -108,6 +113,7 @@ def stands_beside(c: Conversion) -> Iterator[Beside]:
         yield other
     yield from _own_numbers(c)
     yield from _matched(c)
+    yield from _absorbed(c)
     yield from _compensated(c)
     yield from _unstated(c)
 
@@ -134,6 +140,21 @@ def _matched(c: Conversion) -> Iterator[Beside]:
         if _is_another(c.unrounded, found):
             off = percent(work.continuous_deviation(found))
             yield Beside("matched", f"matched at low frequencies: {_dials(found)}, {off}", found, "--match low-frequency")
+
+
+def _absorbed(c: Conversion) -> Iterator[Beside]:
+    """Yield settings that take a filter of the measurement into the dials, beside those that need a lag in front of the block."""
+    if not c.settings.lag:
+        return
+    from pidemu.conversion.convert import converted
+
+    with suppress(PidemuError):
+        request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
+        found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
+        off = found.certificate.feedback.loop_band.max_deviation
+        if off < _FAR:
+            text = f"without the lag, absorbed into the dials: {_dials(found.settings)}, {percent(off)}"
+            yield Beside("absorbed", text, found.settings, "--match low-frequency")
 
 
 def _compensated(c: Conversion) -> Iterator[Beside]:

@@ -11,6 +11,7 @@ from pidemu.card.load import Card
 from pidemu.conversion.request import Request
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
+from pidemu.ranges import RANGES, option_of
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
@@ -33,9 +34,9 @@ def _words(source: Settings, target: Card, request: Request) -> Iterator[str]:
         if v.given:
             yield f"{n}={v.typed if isinstance(v.typed, str) else exactly(v.value)}"
     yield from (f"{n}={x}" for n, x in source.options.items() if n not in source.defaulted)
-    for name, ends in (("pv", source.pv_range), ("op", source.op_range)):
-        if ends is not None:
-            yield f"--{name}-range={exactly(ends[0])},{exactly(ends[1])}"
+    for name, given in zip(RANGES, (source.pv_range, source.op_range), strict=True):
+        if given is not None:
+            yield f"{option_of(name)}={given.argument}"
     yield from ("--to", name_of(target), *request.words())
 
 

@@ -91,7 +91,7 @@ def _of(c: Conversion, s: Settings, *, is_source: bool) -> Iterator[Condition]:
         assert statement.evidence is not None
         yield Condition(
             s.card.id, statement.path, statement.evidence.status.value, words, statement.evidence.note or "",
-            _spread(c, s, statement, is_source=is_source), headline=statement.is_assumed or not statement.path.endswith("on"),
+            _spread(c, s, statement, is_source=is_source), headline=statement.is_assumed or not statement.path.endswith(_MINOR),
         )  # fmt: skip
 
 
@@ -101,6 +101,10 @@ _MATTER: Final = (
     "derivative.filter.applies-to", "cascade.proportional.on",
 )  # fmt: skip
 """Fields that make the law and that a verdict may rest on; of those with one evidence the first is named."""
+
+
+_MINOR: Final = (".on", ".applies-to")
+"""What a verdict does not name in its sentence where it is inferred from something documented."""
 
 
 def _name(s: Settings) -> str:

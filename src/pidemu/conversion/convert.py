@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 
 from pidemu.action import switch_position
 from pidemu.card.base import Form
-from pidemu.card.library import load_card
+from pidemu.card.library import cards, load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
+from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
-from pidemu.conversion.asking import action_questions, ask, mode_is_open, mode_question
+from pidemu.conversion.asking import action_questions, ask, missing_ranges, mode_is_open, mode_question, scale_questions
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.merit import forgets
 from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
@@ -25,9 +27,11 @@ from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
+from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.ranges import RangeGiven
 from pidemu.scan.build import Action
 from pidemu.settings import Settings, limits
 from pidemu.units import Role
@@ -35,6 +39,8 @@ from pidemu.units import Role
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
+_PAIRED = (None, "exact", "same-numbers")
+"""Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
 _SMALLEST, _LARGEST = 1e-120, 1e120
 """Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
@@ -49,12 +55,13 @@ def convert(
     runs_every: float | tuple[float, float] | None = None,
     mode: str = "both",
     action: str | None = None,
-    to_pv_range: object = None,
-    to_op_range: object = None,
+    to_pv_range: RangeGiven | None = None,
+    to_op_range: RangeGiven | None = None,
     match: str | None = None,
     process: Process | None = None,
     compensate: bool = False,
     digits: int | None = None,
+    bias: float | None = None,
     allow_approximate: bool = False,
     assume: bool = False,
     emulate: bool = True,
@@ -84,9 +91,10 @@ def convert(
         The control action, reverse: the output falls when the measurement rises (error SP - PV). The size of the dials does not
         depend on it; where the sign of the target's gain is the action, the gain gets that sign. Where that of the source's is, it
         is known without.
-    to_pv_range, to_op_range : tuple, optional
-        Signal ranges of the target, such as ``(0, 400, "degC")``; by default the source's. A new range of the same quantity
-        rescales the gains, the same signal on another scale does not.
+    to_pv_range, to_op_range : tuple or str, optional
+        Ranges of the target's measurement and output with their unit, ``(0, 1000, "degF")``; by default the source's. Another
+        range of the same quantity rescales the gain for the same effect in its units; the same signal on another scale, such as
+        counts, does not (see `pidemu.range_relation.relation`).
     match : str, optional
         How to match: ``"exact"``, ``"same-numbers"`` (the source's own), ``"low-frequency"``, ``"textbook"``,
         ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load
@@ -99,6 +107,9 @@ def convert(
     digits : int, optional
         Round the dials to their resolution or, where the card states none, to so many significant digits: the certificate is about
         these numbers. By default they are not rounded.
+    bias : float, optional
+        Output of the old controller at SP = PV [% of the output span], for a loop without integral action; without it the answer
+        lists it as open.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     assume : bool
@@ -135,7 +146,7 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        pv_range=to_pv_range, op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)
@@ -146,9 +157,10 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    source = _paced(source, request)
     opens = tuple(unstated(source))
-    ask([*action_questions(source, request), *(o.question for o in opens if o.asked)], source, card, request)
+    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
+    open_questions = [o.question for o in opens if o.asked]
+    ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
     work = _Work(source, card, request, aim)
     ranking = work.ranking()
     if mode_is_open(source, ranking, request):
@@ -160,12 +172,40 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
         refusal += work.other_options()
         if settings is None:
             raise ConversionRefusedError(refusal)
+    ask(missing_ranges(source, settings), source, card, request)
+    _refuse_two_intervals(source, settings, request)
+    shift = "" if refusal else _forgetting(source, settings, request, work.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
+    if shift:
+        conversion = replace(conversion, refusal=shift, certificate=replace(conversion.certificate, shifts_for_good=True))
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if conversion.refusal and not request.allow_approximate:
-        raise ConversionRefusedError(conversion.refusal, conversion)
+        raise ConversionRefusedError(conversion.refusal, conversion, _that_hold(settings) if shift else ())
     return conversion
+
+
+def _forgetting(source: Settings, settings: Settings, request: Request, factor: float) -> str:
+    """Return why a target cannot hold what the source held at a limit; empty where it can, or where an integral makes up for it."""
+    if not forgets(source, settings):
+        return ""
+    from pidemu.certificate.limit_shift import limit_shift
+
+    scans = request.scan or (common_interval(source, settings),) * 2
+    shift = limit_shift(source, settings, scans, factor)
+    return f"{settings.card.id} cannot hold the output of a loop without integral action. {shift.text}" if shift.refuses else ""
+
+
+def _that_hold(settings: Settings) -> tuple[str, ...]:
+    """Return what can hold the output of a loop without integral action."""
+    from pidemu.certificate.limit_shift import choices_that_hold
+
+    choices = choices_that_hold(settings.card, settings.options)
+    options = [f"--set {n}={x} makes {settings.card.id} positional" for choice in choices for n, x in choice.items()]
+    vendor = settings.card.id.partition("/")[0]
+    blocks = [i for i in cards() if i.startswith(f"{vendor}/") and load_card(i).data.implementation == "positional"]
+    named = f", such as {' or '.join(blocks)}" if blocks else ""
+    return (*options, f"a positional block with a bias holds the output{named}; set the bias to the output at SP = PV")
 
 
 def _concluded(
@@ -214,9 +254,11 @@ class _Work:
         self.card = card
         self.request = request
         self.aim = aim
-        self.factor = _rescaling(source, request)
+        self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
         self.fixed = {**_shared(source, card), **request.given}
         self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
+        lag = source.algorithm(scan=request.scan[0] if request.scan else None).pv_filter
+        self.source_lag = lag.time if lag is not None and self.aim.match in _PAIRED else None
         if request.scan is not None:
             source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
@@ -226,14 +268,9 @@ class _Work:
 
         def solver(named: Mapping[str, object]) -> Solver:
             source = self.source
-            goal = Target(
-                self.card,
-                named,
-                self.fixed,
-                request.pv_range or source.pv_range,
-                request.op_range or source.op_range,
-                request.pace[1],
-            )
+            ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
+            scan = request.declared[1] if request.declared else None
+            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan, self.source_lag)
             goal.reject_missing()
             sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
             return Solver(
@@ -323,6 +360,14 @@ def _refuse_absurd_gains(source: Settings) -> None:
             raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
 
 
+def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:
+    """Refuse to guess two scan intervals, where dials of both controllers count in scans."""
+    both = source.counts_scans and settings.counts_scans
+    if request.scan is None and both and source.scan != settings.scan:
+        cards = f"{source.card.id} and of {settings.card.id}"
+        raise SettingError(f"dials of {cards} count in scans; give both scan intervals, --scan H,H2")
+
+
 def _is_negative(source: Settings, target: Target) -> bool:
     """Whether the source has negative gains only, and the target no place for them: then the action changes instead."""
     a, gain = source.algorithm(), target.dial(Role.GAIN)
@@ -353,16 +398,3 @@ def _textbook(solver: Solver) -> Textbook:
         return Textbook(book, solver.certify(book))
     except (NoMatchError, SettingError) as error:
         return Textbook(None, None, str(error))
-
-
-def _rescaling(source: Settings, request: Request) -> float:
-    """Return the factor on the percent gain for new ranges (specs/equations.md, section 3, rescaling)."""
-    factor = 1.0
-    for name, new, old, power in (
-        ("pv_range", request.pv_range, source.pv_range, 1), ("op_range", request.op_range, source.op_range, -1),
-    ):  # fmt: skip
-        if new is not None and old is None and new != (0.0, 100.0):
-            raise SettingError(f"{source.card.id}: the target's {name} is given, the source's is not; give both")
-        if new is not None and old is not None:
-            factor *= ((new[1] - new[0]) / (old[1] - old[0])) ** power
-    return factor

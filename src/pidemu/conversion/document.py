@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import pidemu
-from pidemu.conversion.request import range_text
+from pidemu.plain import json_safe
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -51,8 +51,9 @@ def source_as_given(s: Settings) -> dict[str, Any]:
         "card": s.card.id,
         "settings": {n: v.typed if isinstance(v.typed, str) else v.value for n, v in s.items() if v.given},
         "options": {n: x for n, x in s.options.items() if n not in s.defaulted},
-        "pv_range": range_text(s.pv_range),
-        "op_range": range_text(s.op_range),
+        "pv_range": s.pv_range and s.pv_range.argument,
+        "op_range": s.op_range and s.op_range.argument,
+        "lag_on_pv": s.lag,
     }
 
 
@@ -66,12 +67,14 @@ def question_document(error: QuestionError, known: Mapping[str, Any] | None = No
     known : mapping, optional
         What is known of both sides: ``from`` and ``to``.
     """
-    return {"schema": SCHEMA, **(known or {}), "verdict": "question", "questions": [q.to_dict() for q in error.questions]}
+    plain = {"schema": SCHEMA, **(known or {}), "verdict": "question", "questions": [q.to_dict() for q in error.questions]}
+    safe: dict[str, Any] = json_safe(plain)
+    return safe
 
 
 def refusal_document(error: ConversionRefusedError, known: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a refusal as plain values, with the nearest settings and what could do instead; see `question_document`."""
-    return {
+    plain = {
         "schema": SCHEMA,
         **(known or {}),
         "verdict": "refused",
@@ -79,3 +82,5 @@ def refusal_document(error: ConversionRefusedError, known: Mapping[str, Any] | N
         "nearest": None if error.nearest is None else error.nearest.to_dict(),
         "alternatives": list(error.alternatives),
     }
+    safe: dict[str, Any] = json_safe(plain)
+    return safe

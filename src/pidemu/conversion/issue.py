@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pidemu.certificate.models import Certificate
+from pidemu.certificate.models import EXACT, Certificate
 from pidemu.certificate.nonlinear import nonlinear_differences
+from pidemu.certificate.proof import prove
 from pidemu.certificate.scanwise import common_interval, emulated
 from pidemu.conversion.solve import Solver
 from pidemu.errors import ScanError
@@ -34,6 +35,8 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
             setpoint_before_rounding=before.setpoint_headline,
             setpoint_in_cascade=before.setpoint_in_cascade,
         )
+    if certificate.feedback_is_exact and not work.compensates:
+        certificate = replace(certificate, proof=prove(work.source, unrounded, work.factor, mode=work.mode, within=EXACT))
     if not emulate:
         return certificate
     source = work.source
@@ -43,7 +46,7 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
         certificate = replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))
     try:
         scans = work.scans or (common_interval(source, settings),) * 2
-        both = emulated(source, unrounded, scans, work.factor, taken=work.scans is None)
+        both = emulated(source, unrounded, scans, work.factor, taken=work.scans is None, in_cascade=work.first_mode == "cascade")
     except ScanError as error:
         return replace(certificate, not_emulated=str(error))
     return replace(

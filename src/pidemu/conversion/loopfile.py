@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -24,10 +25,19 @@ class LoopFile(Model):
     set_: dict[Text, str | Number] = Field(
         default={}, description="Options of the target, and dials that shall have a value.", alias="set"
     )
+    to_pv_range: Text | None = Field(default=None, description="Measurement range of the target: 0,1000 degF.")
+    to_op_range: Text | None = Field(default=None, description="Output range of the target: 0,100 %.")
     process: Text | None = Field(default=None, description="The process, as `--process` takes it: gain=1.5,lag=10,delay=3.")
     scan: Number | list[Number] | None = Field(
         default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
     )
+    runs_every: Number | list[Number] | None = Field(
+        default=None, max_length=2, min_length=1, description="Interval at which the source, or both, are really executed [s]."
+    )
+    mode: Literal["auto", "cascade", "both"] | None = Field(default=None, description="Which setpoint counts.")
+    action: Literal["reverse", "direct"] | None = Field(default=None, description="Action of the loop.")
+    bias: Number | None = Field(default=None, description="Output at SP = PV of a loop without integral action [%].")
+    tag: Text | None = Field(default=None, description="The loop's name.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +49,15 @@ class Loop:
     card, to : str
         Source and target card.
     settings, set : dict
-        What is given for the source and for the target.
+        What is given for the source and for the target; ``pv_range`` and ``op_range`` among `settings` are the source's.
     scan : float, tuple of float or None
         Scan interval of both, or of source and target [s].
+    process : str or None
+        The process.
+    to_pv_range, to_op_range : str or None
+        The target's ranges, as they are written.
+    others : dict
+        What else is given of the conversion's arguments: runs_every, mode, action, bias, tag.
     """
 
     card: str
@@ -50,6 +66,9 @@ class Loop:
     set: dict[str, Any]
     scan: float | tuple[float, float] | None
     process: str | None = None
+    to_pv_range: str | None = None
+    to_op_range: str | None = None
+    others: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_loop(file: Path) -> Loop:
@@ -72,6 +91,20 @@ def read_loop(file: Path) -> Loop:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
-    intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
-    scan = None if not intervals else intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
-    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process)
+    ranges = (loop.to_pv_range, loop.to_op_range)
+    given = {
+        "mode": loop.mode,
+        "action": loop.action,
+        "bias": loop.bias,
+        "tag": loop.tag,
+        "runs_every": _intervals(loop.runs_every),
+    }
+    others = {name: value for name, value in given.items() if value is not None}
+    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), _intervals(loop.scan), loop.process, *ranges, others)
+
+
+def _intervals(given: float | list[float] | None) -> float | tuple[float, float] | None:
+    """Return one scan interval or two [s]."""
+    if not isinstance(given, list):
+        return given
+    return given[0] if len(given) == 1 else (given[0], given[1])

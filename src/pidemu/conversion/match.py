@@ -51,6 +51,8 @@ def check_terms(source: Algorithm, target: Target) -> None:
         raise NoMatchError(f"the source has proportional action, {have} has none")
     if not source.kp and target.has_proportional and target.form is not Form.PARALLEL:
         raise NoMatchError(f"the source has no proportional action; the {target.form.value} form of {have} cannot be without it")
+    if source.kd and not source.kp and target.has_proportional and target.filter.of == "derivative-time":
+        raise NoMatchError(f"the source has no proportional action; the derivative's filter of {have} goes with kd/kp")
 
 
 def _chosen(target: Target) -> str:
@@ -75,7 +77,8 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     except UndefinedError:
         raise NoMatchError("the source has more filters than the target") from None
     shape, filt = target.shape, target.filter
-    by_multiplier = target.form is Form.PARALLEL and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
+    of_dial = target.form is Form.PARALLEL and filt.of != "derivative-time"
+    by_multiplier = of_dial and filt.ratio > 0 and target.may_choose(Role.MULTIPLIER)
     if not filt.free and not by_multiplier:
         raise NoMatchError("the target's filter is fixed")
     if filt.needed and n2 and not d1:
@@ -96,7 +99,7 @@ def exact(law: Law, target: Target) -> tuple[Numbers, ...]:
     if not filt.free and not (kd and d1):
         raise NoMatchError("there is no derivative with a filter to set the multiplier by")
     if not filt.free:
-        return (Numbers(kp, n0, kd, multiplier=abs(filt.ratio * kd / d1)),)
+        return (Numbers(kp, n0, kd, multiplier=abs(filt.ratio * kd / (d1 * target.percent_per_unit))),)
     if target.has_proportional:
         return (Numbers(kp, n0, kd, d1),)
     if abs(kp) > 0:
@@ -236,7 +239,8 @@ def _behind_filter(m0: float, m1: float, m2: float, target: Target, filt: Target
     if filt.kind == "time":
         Tf = filt.time
         return _through_signal_filter(m0, m1 + m0 * Tf, m2 + m1 * Tf + m0 * Tf * Tf * (1 - second), Tf, target)
-    if target.form is Form.PARALLEL or (target.form is Form.SERIES and not filt.effective):
+    known = {Form.STANDARD: True, Form.PARALLEL: filt.of == "derivative-time", Form.SERIES: filt.of == "effective-derivative"}
+    if not known.get(target.form):
         raise NoMatchError("there is no closed form for this filter")
     rho = filt.ratio
     # Tf = rho Td:  m0 rho (1 - (1 - second) rho) Td^2 + m1 (1 - rho) Td - m2 = 0

@@ -31,6 +31,8 @@ _DISTANCE: Final = {
 }  # fmt: skip
 """How far a form is from another, to somebody who knows the dials of the first."""
 _TERMS: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
+_UNBOUNDED: Final = 1000
+"""Distance of noise gains of which one is nothing beside the other."""
 _DIAL: Final = 1e-6
 """Relative difference from which a dial is another one."""
 _SURE_ROUNDING: Final = 5e-4
@@ -49,6 +51,8 @@ class Merit:
         How far the terms that see the setpoint are from the source's, in the worst mode: see `setpoint_class`.
     nonlinear : bool
         Whether what is not linear, such as a squared error, differs.
+    forgets : bool
+        Whether the target has no integral action and forgets at a limit where it was, which the source does not.
     noisy : bool
         Whether noise is more than 1.5 times the source's without the law being the same.
     verdict : int
@@ -80,6 +84,7 @@ class Merit:
     unused: int = 0
     setpoint: int = 0
     nonlinear: bool = False
+    forgets: bool = False
     noisy: bool = False
     verdict: int = 0
     form: int = 0
@@ -108,6 +113,7 @@ _WORDS: Final = {
     "unused": "a dial that was given is not in use",
     "setpoint": "other terms see the setpoint",
     "nonlinear": "a nonlinear option differs",
+    "forgets": "forgets at a limit where it was",
     "noisy": "much more noise on the output",
     "verdict": "farther from the source",
     "form": "another form than the source's",
@@ -146,6 +152,7 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         unused=unused,
         setpoint=max(setpoint_class(in_mode(a, m), in_mode(b, m)) for m in modes),
         nonlinear=a.beyond_the_law != b.beyond_the_law,
+        forgets=forgets(source, settings),
         noisy=not exact and ratio > _NOISY,
         verdict=_class(work, certificate),
         form=0
@@ -156,12 +163,18 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         rules=rules_differ(source, settings),
         assumed=_assumed(settings),
         windup=a.windup != b.windup,
-        noise=0 if exact or not math.isfinite(ratio) or not ratio else round(abs(math.log(ratio)) * 10),
+        noise=0 if exact else _noise_steps(ratio),
         derivative=not b.kd and settings.equation.derivative.on not in ("pv", "none"),
         rounding=_coarse(rounding_error(settings)),
         units=_other_units(source, settings),
         changed=changed,
     )
+
+
+def forgets(source: Settings, target: Settings) -> bool:
+    """Whether a source that holds its output by a bias meets a target that counts from its last output, without integral action."""
+    a, b = source.algorithm(), target.algorithm()
+    return not (a.ki or b.ki or a.velocity) and b.velocity
 
 
 def setpoint_class(source: Algorithm, target: Algorithm) -> int:
@@ -235,6 +248,10 @@ def _noise(work: Solver, settings: Settings) -> float:
     if math.isinf(before):
         return 1.0
     return noise_gain(settings, new) / before if before else math.inf
+
+
+def _noise_steps(ratio: float) -> int:
+    return _UNBOUNDED if not 0 < ratio < math.inf else round(abs(math.log(ratio)) * 10)
 
 
 def _assumed(settings: Settings) -> int:

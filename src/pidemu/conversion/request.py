@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +16,9 @@ from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
+from pidemu.ranges import RANGES, SignalRange, option_of, read_range
 from pidemu.reading import signal_range
 from pidemu.scan.build import Action
-from pidemu.words import pair
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
@@ -37,12 +38,14 @@ class Request:
         These intervals per those that the algorithms compute with.
     mode, action, match, tag
         As in `convert`.
-    pv_range, op_range : tuple of float or None
-        Signal ranges of the target.
+    to_pv_range, to_op_range : SignalRange or None
+        Ranges of the target's measurement and output.
     process : Process or None
         The process.
     digits : int or None
         Digits to round to.
+    bias : float or None
+        Output at SP = PV of a loop without integral action [% of the output span], where it was stated.
     compensate, allow_approximate, assume : bool
         As in `convert`.
     """
@@ -54,10 +57,11 @@ class Request:
     mode: Modes = "both"
     action: Action | None = None
     match: str | None = None
-    pv_range: tuple[float, float] | None = None
-    op_range: tuple[float, float] | None = None
+    to_pv_range: SignalRange | None = None
+    to_op_range: SignalRange | None = None
     process: Process | None = None
     digits: int | None = None
+    bias: float | None = None
     compensate: bool = False
     allow_approximate: bool = False
     assume: bool = False
@@ -65,15 +69,15 @@ class Request:
 
     @property
     def declared(self) -> tuple[float, float] | None:
-        """Intervals that source and target compute with [s]."""
+        """The intervals that source and target compute with [s], to twelve digits."""
         if self.scan is None:
             return None
-        source, target = (float(f"{h / r:.12g}") for h, r in zip(self.scan, self.pace, strict=True))
+        source, target = (float(f"{_ratio(h, pace):.12g}") for h, pace in zip(self.scan, self.pace, strict=True))
         return source, target
 
     @property
     def runs_every(self) -> tuple[float, float] | None:
-        """Intervals at which both are executed, where these are others than those they compute with [s]."""
+        """The intervals at which both are executed, where these are others than those they compute with [s]."""
         return self.scan if self.pace != (1.0, 1.0) else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -85,12 +89,13 @@ class Request:
             "runs_every": self.runs_every and list(self.runs_every),
             "mode": self.mode,
             "action": self.action,
-            "to_pv_range": range_text(self.pv_range),
-            "to_op_range": range_text(self.op_range),
+            "to_pv_range": self.to_pv_range and self.to_pv_range.argument,
+            "to_op_range": self.to_op_range and self.to_op_range.argument,
             "match": self.match,
-            "process": None if self.process is None else written(self.process),
+            "process": self.process and written(self.process),
             "compensate": self.compensate,
             "digits": self.digits,
+            "bias": self.bias,
             "allow_approximate": self.allow_approximate,
             "assume": self.assume,
             "tag": self.tag,
@@ -106,9 +111,9 @@ class Request:
             yield from ("--runs-every", _intervals(self.runs_every))
         if self.mode != "both":
             yield from ("--mode", self.mode)
-        for name, ends in (("pv", self.pv_range), ("op", self.op_range)):
-            if ends is not None:
-                yield f"--to-{name}-range={exactly(ends[0])},{exactly(ends[1])}"
+        for name, given in zip(RANGES, (self.to_pv_range, self.to_op_range), strict=True):
+            if given is not None:
+                yield f"{option_of(name, target=True)}={read_range(given).argument}"
         if self.match is not None:
             yield from ("--match", self.match)
         if self.action is not None:
@@ -117,6 +122,8 @@ class Request:
             yield from ("--process", written(self.process))
         if self.digits not in (None, DIGITS):
             yield from ("--digits", str(self.digits))
+        if self.bias is not None:
+            yield from ("--bias", exactly(self.bias))
         if self.tag:
             yield from ("--tag", self.tag)
         flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
@@ -127,16 +134,6 @@ _SHORTEST, _LONGEST = 1e-9, 1e9
 """Intervals beyond these are mistakes, and what is computed from them leaves the range of floating point [s]."""
 DIGITS = 5
 """Significant digits that the command line and the page print."""
-
-
-def range_text(ends: tuple[float, float] | None) -> str | None:
-    """Return a signal range as ``--pv-range`` takes it."""
-    return None if ends is None else f"{exactly(ends[0])},{exactly(ends[1])}"
-
-
-def read_range_text(text: str | None) -> tuple[float, float] | None:
-    """Return the signal range that `range_text` wrote."""
-    return None if text is None else pair(text)
 
 
 def _intervals(both: tuple[float, ...]) -> str:
@@ -153,10 +150,11 @@ def read_request(
     mode: object,
     action: object,
     match: str | None,
-    pv_range: object,
-    op_range: object,
+    to_pv_range: object,
+    to_op_range: object,
     process: Process | None,
     digits: object,
+    bias: float | None,
     compensate: bool,
     allow_approximate: bool,
     assume: bool,
@@ -191,10 +189,11 @@ def read_request(
         mode=read_mode(mode),
         action=read_action(action),
         match=match,
-        pv_range=signal_range(card, "pv_range", pv_range),
-        op_range=signal_range(card, "op_range", op_range),
+        to_pv_range=signal_range(card, "to_pv_range", to_pv_range),
+        to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
+        bias=bias,
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,
@@ -214,7 +213,12 @@ def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float]
     source = real[0] if declared is None else declared[0]
     target = declared[1] if declared is not None and len(declared) == 2 else real[0]
     target_real = real[1] if len(real) == 2 else target
-    return (real[0], target_real), (real[0] / source, target_real / target)
+    return (real[0], target_real), (_ratio(real[0], source), _ratio(target_real, target))
+
+
+def _ratio(real: float, declared: float) -> float:
+    """Return a quotient of two numbers as they were typed: 0.02 over 0.2 is 0.1."""
+    return float(Fraction(repr(real)) / Fraction(repr(declared)))
 
 
 def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:

@@ -8,7 +8,8 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pidemu.action import action_words, carried_action
+from pidemu.action import action_line, action_words, carried_action
+from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
@@ -27,6 +28,7 @@ from pidemu.scan.build import Action
 from pidemu.settings import Settings
 
 if TYPE_CHECKING:
+    from pidemu.certificate.proof import Proof
     from pidemu.cutover.bench_check import BenchCheck
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
@@ -115,6 +117,11 @@ class Conversion:
             return {mode: self.certificate.verdict_in(mode) for mode in MODES}
         return {self.request.mode: self.verdict}
 
+    @property
+    def proof(self) -> Proof | None:
+        """Both laws compared without rounding; ``None`` where they are not the same anyway, or where the scans were made up for."""
+        return self.certificate.proof
+
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """On which unverified facts of the cards the result rests, with what else it would be."""
@@ -138,7 +145,11 @@ class Conversion:
     @property
     def sentence(self) -> str:
         """The verdict in a sentence or two for whoever stands at the loop, with the conditions that it rests on."""
-        return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed)
+        return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed, self._lag)
+
+    @property
+    def _lag(self) -> str:
+        return f"{number(self.settings.lag)} s" if self.settings.lag else ""
 
     @cached_property
     def bench_check(self) -> BenchCheck | ScanError:
@@ -153,9 +164,14 @@ class Conversion:
     @property
     def at_the_loop(self) -> tuple[str, ...]:
         """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+        lines = [f"Action: {self.action_text}." + self._old_action()]
+        if self.request.bias is not None and not self.settings.algorithm().ki:
+            lines.append(
+                f"Bias: set the output at SP = PV to {number(self.request.bias)} %, by the manual reset or bias of the new block."
+            )
         check = self.bench_check
-        bench = f"no bench check: {check}" if isinstance(check, ScanError) else f"bench check: {check.text}"
-        return f"action: {self.action_text}", bench
+        lines.append(f"No bench check: {check}." if isinstance(check, ScanError) else f"Bench check: {check.text}")
+        return tuple(lines)
 
     @cached_property
     def command(self) -> str:
@@ -178,6 +194,14 @@ class Conversion:
         known = self.action
         both: tuple[Action, ...] = ("reverse", "direct") if known is None else (known,)
         return "; ".join(self._action_words(a) for a in both)
+
+    def _old_action(self) -> str:
+        """Return what the action is called on the source, where that is another word."""
+        old, new = self.source.equation.action, self.settings.equation.action
+        same = {k: v.casefold() for k, v in old.names.items()} == {k: v.casefold() for k, v in new.names.items()}
+        if same and self.factor > 0 and old.fixed == new.fixed:
+            return ""
+        return f" On {self.source.card.id} it is {action_line(self.source, self.action)}."
 
     def _action_words(self, action: Action) -> str:
         carried = carried_action(self.settings)
@@ -263,4 +287,5 @@ class Conversion:
         plain = self.settings.to_dict()
         for name, dial in plain["settings"].items():
             dial["unrounded"] = self.unrounded[name].value
+        plain["lag_on_pv"] = self.settings.lag
         return plain

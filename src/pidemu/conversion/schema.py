@@ -12,7 +12,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, RootModel, TypeAdapter
 
+from pidemu.certificate import models
 from pidemu.certificate.models import Certificate, Verdict
+from pidemu.certificate.proof import Proof
 from pidemu.conversion.aim import Match
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.questions import Kind
@@ -25,12 +27,22 @@ Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
 Intervals = Annotated[list[float], Field(min_length=2, max_length=2)]
 _CERTIFICATE: Final = "Certificate"
+_LINES: Final = {"type": "array", "items": {"type": "string"}}
 
 
 class Part(BaseModel):
     """A part of the document; what it does not name is not in it."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+
+
+class Range(Part):
+    """The range of a signal, and what a raw scale stands for."""
+
+    low: float
+    high: float
+    unit: str
+    meaning: Range | None = None
 
 
 class Dial(Part):
@@ -52,12 +64,15 @@ class Side(Part):
     card: Name = Field(description="The card's id.")
     settings: dict[Name, Dial] = Field(description="The dials in use, by name.")
     options: dict[Name, str] = Field(description="Choice by option, all options.")
+    pv_range: Range | None = Field(default=None, description="Measurement range, where it was given.")
+    op_range: Range | None = Field(default=None, description="Output range, where it was given.")
 
 
 class Target(Side):
     """The settings that were found."""
 
     settings: dict[Name, TargetDial] = Field(description="The dials in use, by name.")  # type: ignore[assignment]
+    lag_on_pv: Number = Field(description="A first-order lag on the measurement that has to stand in front of the block [s].")
 
 
 class Card(Part):
@@ -74,6 +89,7 @@ class AsGiven(Part):
     options: dict[Name, Line] = Field(description="Options that were stated.")
     pv_range: Line | None = Field(description="Measurement range, as `--pv-range` takes it.")
     op_range: Line | None = Field(description="Output range.")
+    lag_on_pv: float = Field(ge=0, allow_inf_nan=False, description="A lag on the measurement in front of the block [s].")
 
 
 class Asked(Part):
@@ -93,6 +109,7 @@ class Asked(Part):
     process: Line | None = Field(description="The process, as `--process` takes it.")
     compensate: bool
     digits: int | None
+    bias: float | None = Field(description="Output at SP = PV of a loop without integral action [%].")
     allow_approximate: bool
     assume: bool
     tag: Line
@@ -271,13 +288,18 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of what ``pidemu convert --json`` prints."""
     plain: dict[str, Any] = Outcome.model_json_schema(by_alias=True, mode="serialization")
     definitions: dict[str, Any] = plain.pop("$defs")
-    figures = TypeAdapter(Certificate).json_schema(mode="serialization")
+    certificate = TypeAdapter(Certificate)
+    certificate.rebuild(_types_namespace={**vars(models), "Proof": Proof})
+    figures = certificate.json_schema(mode="serialization")
     definitions |= {**figures.pop("$defs"), _CERTIFICATE: figures}
     definitions["Number"] = {"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf", "nan"]}]}
     for name in (*figures_of(figures, definitions), _CERTIFICATE):
         _close(definitions[name])
     definitions["Kick"]["properties"]["ratio"] = {"$ref": "#/$defs/Number", "description": "Target's kick per source's."}
     definitions["Kick"]["required"].append("ratio")
+    more = {"feedback_equal": {"type": "boolean"}, "setpoint_equal": {"type": "boolean"}, "text": _LINES}
+    definitions["Proof"]["properties"] |= more
+    definitions["Proof"]["required"] += list(more)
     reference = {"$ref": f"#/$defs/{_CERTIFICATE}"}
     definitions["ConversionPart"]["properties"]["certificate"] = reference
     definitions["TextbookPart"]["properties"]["certificate"] = {"anyOf": [reference, {"type": "null"}]}

@@ -77,13 +77,13 @@ def side_title(s: Settings) -> str:
 
 def ranges_line(s: Settings) -> str:
     """Return the signal ranges; empty where none was given."""
-    given = [f"{name} {range_words(ends)}" for name, ends in (("PV", s.pv_range), ("OP", s.op_range)) if ends is not None]
+    given = [f"{name} {ends}" for name, ends in (("PV", s.pv_range), ("OP", s.op_range)) if ends is not None]
     return f"ranges: {', '.join(given)}" if given else ""
 
 
-def range_words(ends: tuple[float, float]) -> str:
-    """Return a signal range in words."""
-    return f"{number(ends[0])} to {number(ends[1])}"
+def lag_line(s: Settings) -> str:
+    """Return the lag that has to stand in front of a block; empty where there is none."""
+    return f"in front of it, on PV: a first-order lag of {number(s.lag)} s" if s.lag else ""
 
 
 def pace_line(s: Settings) -> str:
@@ -120,6 +120,12 @@ def condition_line(condition: Condition) -> str:
 def figure_lines(c: Conversion) -> list[str]:
     """Return what stands below the table of figures."""
     return [line for line in (emulation_line(c.certificate), kick_line(c.certificate), textbook_line(c)) if line]
+
+
+def proof_lines(c: Conversion) -> tuple[str, ...]:
+    """Return the proof that both laws are the same, indented; empty where they are not, or where it was not decided."""
+    proof = c.proof
+    return proof.text if proof is not None and proof.decided and proof.feedback_equal else ()
 
 
 def bump_line(plan: TransferPlan) -> str:

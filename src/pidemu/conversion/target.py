@@ -9,12 +9,13 @@ from functools import cached_property
 from typing import Any, Final, Literal
 
 from pidemu.algorithm import Algorithm
-from pidemu.canonical import gain_sign
+from pidemu.canonical import default_scan, gain_sign
 from pidemu.card.base import Form, Rule
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
+from pidemu.ranges import SignalRange
 from pidemu.settings import Settings, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
@@ -84,8 +85,8 @@ class TargetFilter:
         Whether the derivative is nothing without it: the lagged-difference rule.
     lead_lag : bool
         Whether it is the lag of a lead-lag.
-    effective : bool
-        Whether ratio or gain refer to ``Ti Td/(Ti + Td)``.
+    of : {"derivative", "derivative-time", "effective-derivative"}
+        What ratio or gain refer to: the derivative dial, ``kd/kp`` of a parallel form, ``Ti Td/(Ti + Td)``.
     low, high : float
         Allowed values, in the dial's own terms made canonical.
     """
@@ -96,7 +97,7 @@ class TargetFilter:
     value: float = 0.0
     needed: bool = False
     lead_lag: bool = False
-    effective: bool = False
+    of: Literal["derivative", "derivative-time", "effective-derivative"] = "derivative"
     low: float = 0.0
     high: float = math.inf
 
@@ -139,10 +140,15 @@ class Target:
         Options by name.
     given : mapping
         Dials that the user has fixed.
-    pv_range, op_range : tuple of float, optional
-        Signal ranges.
+    pv_range, op_range : SignalRange, optional
+        Ranges of measurement and output.
     pace : float
         Interval at which the target is really executed per the one that it computes with; see `Settings.pace`.
+    scan : float, optional
+        Scan interval that it computes with [s], for dials that count in scans; by default the card's.
+    source_lag : float, optional
+        The lag with which the source filters its measurement [s], where the target is to have it too, in its own filter or in front
+        of it; ``None``: whatever filters the target has are part of what is matched.
     """
 
     def __init__(
@@ -150,9 +156,11 @@ class Target:
         card: Card,
         options: Mapping[str, object],
         given: Mapping[str, object],
-        pv_range: tuple[float, float] | None,
-        op_range: tuple[float, float] | None,
+        pv_range: SignalRange | None,
+        op_range: SignalRange | None,
         pace: float = 1.0,
+        scan: float | None = None,
+        source_lag: float | None = None,
     ) -> None:
         self.card = card
         self.pace = pace
@@ -160,16 +168,33 @@ class Target:
         self.options = dict(options)
         self.given = dict(given)
         self.ranges = {k: v for k, v in (("pv_range", pv_range), ("op_range", op_range)) if v is not None}
-        self.spans = spans_of(pv_range, op_range)
+        self.scan = scan
+        self.spans = spans_of(pv_range, op_range, default_scan(self.variant.equation) if scan is None else scan)
         self.form = self.variant.equation.form
         self.idle_gain = 1.0
         """Gain taken where there is no proportional term, so that the gain only scales the two times."""
+        self.lag = 0.0
+        """A lag in front of the block [s]."""
+        self.is_paired = source_lag is not None
+        """Whether source and target filter the measurement alike, so that the rest is matched as if neither did."""
+        if source_lag is not None:
+            self._filter_the_measurement(source_lag)
         self._check_given()
         dial = self.dial(Role.MULTIPLIER)
         self.multiplier = self.template()[dial[0]].canonical if dial is not None else 1.0
         """Overall multiplier of all three terms."""
         self.filter = self._find_filter()
         """The filter, whether it is free and, once a match has fixed it, its value."""
+
+    def _filter_the_measurement(self, lag: float) -> None:
+        """Set the target's own filter on the measurement to a lag [s], or ask for one in front of the block."""
+        measurement = self.variant.equation.measurement
+        name = None if measurement is None or measurement.filter is None else measurement.filter.time
+        if not isinstance(name, str):
+            self.lag = lag
+        elif name.casefold() not in {n.casefold() for n in self.given}:
+            setting = self.variant.equation.settings[name]
+            self.given[name] = from_canonical(Role.FILTER_TIME, lag / self.pace, parse_unit(setting.unit), self.spans)
 
     def _check_given(self) -> None:
         known = {n.casefold(): n for n in self.variant.equation.settings}
@@ -211,27 +236,33 @@ class Target:
         """Whether there is a derivative term."""
         return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
 
+    @property
+    def percent_per_unit(self) -> float:
+        """Percent gain that a gain of 1 in the card's own signals amounts to [%/%]."""
+        return float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+
     def _find_filter(self) -> TargetFilter:
         filt = self.variant.equation.derivative.filter
         if filt is None:
             return TargetFilter()
         kind: FilterKind = "ratio" if filt.ratio is not None else "gain" if filt.gain is not None else "time"
         given = filt.ratio if kind == "ratio" else filt.gain if kind == "gain" else filt.time
-        shape = {"lead_lag": filt.applies_to == "lead-lag", "effective": filt.of == "effective-derivative"}
-        shape["needed"] = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
+        needed = self.variant.equation.derivative.rule is Rule.LAGGED_DIFFERENCE
+        shape: dict[str, Any] = {"lead_lag": filt.applies_to == "lead-lag", "of": filt.of, "needed": needed}
         if not isinstance(given, str):
             return TargetFilter(kind, None, False, float(given or 0.0) * (self.pace if kind == "time" else 1.0), **shape)
         setting = self.variant.equation.settings[given]
         role, unit = Role(setting.sets), parse_unit(setting.unit)
         pace = self.pace if kind == "time" else 1.0
-        low, high = (to_canonical(role, x, unit) * pace for x in limits(setting))
+        low, high = (to_canonical(role, x, unit, self.spans) * pace for x in limits(setting))
         present = self.template()[given].canonical * pace
         return TargetFilter(kind, given, self.is_free(given, setting), present, low=low, high=high, **shape)
 
     @cached_property
     def shape(self) -> Algorithm:
         """The target's algorithm with placeholder numbers, for everything but its numbers."""
-        return self.template().algorithm()
+        found = self.template().algorithm()
+        return replace(found, pv_filter=None) if self.is_paired else found
 
     def template(self, **extra: object) -> Settings:
         """Return settings with placeholder numbers in the dials that a conversion computes."""
@@ -240,7 +271,8 @@ class Target:
             if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
                 undefined = setting.sets == "derivative" and self.form is Form.SERIES and not self.has_proportional
                 values[name] = (*off_values(setting), 0.0)[0] if undefined else _placeholder(setting)
-        return replace(self.card.settings({**self.variant.chosen, **values, **self.ranges}), pace=self.pace)
+        settings = self.card.settings({**self.variant.chosen, **values, **self.ranges})
+        return replace(settings, pace=self.pace, lag=self.lag).at_scan(self.scan)
 
     def settings(self, n: Numbers) -> Settings:
         """Return the target's settings for canonical numbers.
@@ -251,7 +283,7 @@ class Target:
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
         dials = {**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges}
-        return replace(self.card.settings(dials), pace=self.pace)
+        return replace(self.card.settings(dials), pace=self.pace, lag=self.lag).at_scan(self.scan)
 
     def _idle(self) -> dict[str, object]:
         """Return values for filter and weights that have no default, where nothing depends on them."""
@@ -286,7 +318,7 @@ class Target:
     def _dials(self, n: Numbers) -> dict[str, float]:
         parallel = self.form is Form.PARALLEL
         scale = self.multiplier if n.multiplier is None else n.multiplier
-        engineering = float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
+        engineering = self.percent_per_unit
         per_gain = 1 / n.K if n.K and not parallel else 0.0
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
@@ -306,8 +338,7 @@ class Target:
             if dial is not None:
                 dials[dial[0]] = self._in_reach(*dial, self._to_dial(*dial, value))
         if n.Tf is not None and self.filter.setting is not None:
-            base = time / (1 + rate * time) if self.filter.effective else time
-            dials.update(self._filter_dial(n.Tf, base * self.pace))
+            dials.update(self._filter_dial(n.Tf, self.filter_base(n)))
         return dials
 
     def _in_reach(self, name: str, setting: Setting, value: float) -> float:
@@ -362,9 +393,11 @@ class Target:
         """Return the derivative time that the filter's ratio or gain refers to [s], for numbers that may be arrays."""
         scale = self.multiplier if n.multiplier is None else n.multiplier
         parallel = self.form is Form.PARALLEL
-        scale *= float(self.spans.ratio) if self.variant.equation.signals == "engineering" else 1.0
-        time = n.kd / scale if parallel else 0.0 if _is_zero(n.K) else n.kd / n.K
-        return time / (1 + time * n.ki / n.K) if self.filter.effective and not _is_zero(time) else time
+        scale *= self.percent_per_unit
+        of_dial = parallel and self.filter.of != "derivative-time"
+        time = n.kd / scale if of_dial else _over(n.kd, n.K)
+        effective = self.filter.of == "effective-derivative" and not _is_zero(time)
+        return time / (1 + time * n.ki / n.K) if effective else time
 
     def algorithm_of(self, n: Numbers) -> Algorithm:
         """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
@@ -375,6 +408,11 @@ class Target:
         kd = n.kd - n.K * Tf if f.lead_lag else n.kd
         b, c = (own if x is None else x for own, x in ((self.shape.b, n.b), (self.shape.c, n.c)))
         return replace(self.shape, kp=n.K if self.has_proportional else 0.0, ki=n.ki, kd=kd, Tf=Tf, b=b, c=c)
+
+
+def _over(x: Any, y: Any) -> Any:
+    """Return a quotient, 0 where there is nothing to divide by."""
+    return 0.0 if _is_zero(y) else x / y
 
 
 def _is_zero(x: Any) -> bool:

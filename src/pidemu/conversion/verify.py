@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +16,6 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number
 from pidemu.conversion.convert import convert
 from pidemu.conversion.document import card_versions
-from pidemu.conversion.request import read_range_text
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.schema import AsGiven, Asked
 from pidemu.conversion.signed import Signed, read_signed
@@ -29,7 +28,7 @@ FIGURE: Final = 1e-4
 printed to two to four digits."""
 ZERO: Final = 1e-5
 """Difference of figures that is none, whatever their size: what rounding dials to five digits makes of zero [1, dB, deg, s]."""
-_PLACES: Final = frozenset({"worst_at", "largest_at", "segment", "text"})
+_PLACES: Final = frozenset({"worst_at", "largest_at", "notes", "text"})
 """What is not compared: where a largest value is, which jumps between equal ones, and wording."""
 SHORT: Final = 12
 """Digits of a card's version in print."""
@@ -194,7 +193,7 @@ def _again(signed: Signed, source: Card, target: Card) -> Conversion:
     """Return the conversion that the certificate is of, computed today."""
     asked, figures = signed.request, signed.figures
     emulate = figures.get("scan_by_scan") is not None or bool(figures.get("not_emulated"))
-    settings = source.settings(_given(asked.source))
+    settings = replace(source.settings(_given(asked.source)), lag=asked.source.lag_on_pv)
     try:
         return convert(settings, target, emulate=emulate, **_arguments(asked))
     except ConversionRefusedError as error:
@@ -204,14 +203,13 @@ def _again(signed: Signed, source: Card, target: Card) -> Conversion:
 
 
 def _given(source: AsGiven) -> dict[str, object]:
-    ranges = {"pv_range": read_range_text(source.pv_range), "op_range": read_range_text(source.op_range)}
+    ranges = {"pv_range": source.pv_range, "op_range": source.op_range}
     return {**source.options, **source.settings, **{n: r for n, r in ranges.items() if r is not None}}
 
 
 def _arguments(asked: Asked) -> dict[str, Any]:
     """Return the arguments of `convert`."""
     found = {name: getattr(asked, name) for name in type(asked).model_fields if name not in ("source", "to")}
-    found |= {name: read_range_text(found[name]) for name in ("to_pv_range", "to_op_range")}
     if asked.process is not None:
         from pidemu.loop.process import parse_process
 
@@ -294,7 +292,7 @@ def _figures(name: str, old: Any, new: Any, *, complete: bool) -> Iterator[tuple
     elif a is not None and b is not None:
         if not _same(a, b, FIGURE, ZERO):
             yield name, _text(old), _text(new)
-    elif type(old) is not type(new) or old != new:
+    elif type(old) is not type(new) or (old != new and not isinstance(new, str)):  # words are not compared
         yield name, _text(old), _text(new)
 
 

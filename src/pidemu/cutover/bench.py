@@ -10,6 +10,7 @@ from pidemu.algorithm import Algorithm
 from pidemu.canonical import default_scan
 from pidemu.emulator import Controller
 from pidemu.errors import ScanError
+from pidemu.ranges import SignalRange
 from pidemu.scan.build import Action
 from pidemu.settings import Settings, Value
 from pidemu.units import FULL, Role, from_canonical, parse_unit
@@ -26,7 +27,7 @@ class Range:
     rescaled : bool
         Whether the controller computes in percent of it, so that the two units differ.
     unit : str
-        The unit that the signal is given in: ``%`` or ``eu``.
+        The unit that the signal is given in: that of its range, ``eu`` where it states none, ``%`` without a range.
     """
 
     low: float
@@ -60,10 +61,10 @@ class Range:
         return f"{self.given(own):.6g} {self.unit}"
 
 
-def _range(settings: Settings, given: tuple[float, float] | None) -> Range:
-    low, high = given or (0.0, 100.0)
-    rescaled = settings.equation.signals == "percent" and given is not None
-    return Range(low, high - low, rescaled, "%" if given is None else "eu")
+def _range(settings: Settings, given: SignalRange | None) -> Range:
+    if given is None:
+        return Range(0.0, 100.0, False, "%")
+    return Range(given.low, given.span, settings.equation.signals == "percent", given.unit or "eu")
 
 
 @dataclass(frozen=True, slots=True)

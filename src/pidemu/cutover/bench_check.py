@@ -208,10 +208,10 @@ def _amount(settings: Settings, signal: str, x: float) -> str:
     size = _digits(abs(x))
     if given is None:
         return f"{size} {'%' if settings.equation.signals == 'percent' else f'{signal.upper()} units'}"
-    own = abs(x) * abs(given[1] - given[0]) / 100
-    if (given[0], given[1]) == (0.0, 100.0):
+    own = abs(x) * given.span / 100
+    if given.ends == (0.0, 100.0) and given.unit in ("", "%"):
         return f"{size} %"
-    unit = getattr(settings, f"{signal}_unit", "") or f"{signal.upper()} units"
+    unit = given.unit or f"{signal.upper()} units"
     return f"{size} % ({_digits(own)} {unit})"
 
 

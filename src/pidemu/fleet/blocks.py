@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pidemu.engines import Choice
 from pidemu.fleet.prepare import Prepared
 from pidemu.loop.experiment import FIGURES, integral_of_error
+from pidemu.loop.outcome import late_scan
 from pidemu.loop.simulation import run_trial
 from pidemu.loop.trial import Trial
 from pidemu.targets.runner import Block
@@ -160,5 +161,6 @@ def figures_of(trial: Trial, pv: Floats, out: Floats) -> dict[str, float]:
             "travel": float(np.sum(np.abs(np.diff(out, prepend=trial.initial[2])))),
             "at_low": float(np.count_nonzero(out <= trial.limits[0]) * trial.scan),
             "at_high": float(np.count_nonzero(out >= trial.limits[1]) * trial.scan),
+            "swing": float(np.ptp(error[late_scan(trial.scans) :])),
             "error": float(error[-1]),
         }

@@ -58,6 +58,7 @@ class Fleet:
         folder: str | Path | None = None,
         parquet: str | Path | None = None,
         engine: Engine | None = None,
+        margins: bool = True,
         cores: int | None = None,
         cluster: Any = None,
         progress: bool | None = None,
@@ -82,6 +83,9 @@ class Fleet:
             a folder they are nowhere else.
         engine : {"python", "numpy", "numba", "c"}, optional
             What runs the loops; all give the same bits. By default the quickest for each group of loops.
+        margins : bool
+            Compute margins and stability of every loop, which takes about as long as running it does; without them an unstable loop
+            is ``"done"`` like any other.
         cores : int, optional
             Threads on this machine; by default one per core.
         cluster : str or distributed.Client or distributed cluster, optional
@@ -105,7 +109,7 @@ class Fleet:
             raise FleetError(f"{cores} cores cannot run anything; give at least 1")
         result = FleetResult(self.loops)
         keeps = keep or folder is not None or parquet is not None
-        plan = Plan(setpoint, load, time, keeps, checked(engine))
+        plan = Plan(setpoint, load, time, keeps, checked(engine), margins)
         with contextlib.ExitStack() as stack:
             store = stack.enter_context(SignalStore(keep, folder, parquet)) if keeps else None
             bar = stack.enter_context(Progress(len(self.loops), progress))

@@ -65,6 +65,8 @@ class Plan:
         Keep measurement and output of every scan.
     engine : {"python", "numpy", "numba", "c"} or None
         The engine; by default the quickest for each group.
+    margins : bool
+        Compute margins and stability of every loop.
     """
 
     setpoint: float | Step = 10.0
@@ -72,6 +74,7 @@ class Plan:
     time: float | None = None
     keep: bool = False
     engine: Engine | None = None
+    margins: bool = True
 
     def trial(self, loop: Loop) -> Trial:
         """Return the trial of a loop.

@@ -7,9 +7,11 @@ import gc
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from pidemu.certificate.models import LoopFigures
 from pidemu.errors import PidemuError
 from pidemu.fleet.loops import Loop, Plan
 from pidemu.loop.experiment import Measuring, Steps, experiment
+from pidemu.loop.outcome import late_scan, margins_if_any
 from pidemu.loop.trial import Trial
 from pidemu.scan.program import Program, Structure
 
@@ -32,6 +34,8 @@ class Prepared:
         Coefficients, and states before the first scan.
     lengths : tuple of int
         Scans that each delay line delays by.
+    margins : LoopFigures or None
+        Margins of the sampled loop, where they were asked for and there are any.
     """
 
     place: int
@@ -41,6 +45,7 @@ class Prepared:
     values: tuple[float, ...]
     initial: tuple[float, ...]
     lengths: tuple[int, ...]
+    margins: LoopFigures | None = None
 
 
 @dataclass(frozen=True)
@@ -117,13 +122,14 @@ def _prepared(place: int, loop: Loop, plan: Plan, shared: dict[Structure, Struct
     try:
         trial = plan.trial(loop)
         program = measured(trial)
+        margins = margins_if_any(trial) if plan.margins else None
     except PidemuError as error:
         return Failed(place, str(error))
     except Exception as error:  # such as a text for a number: one wrong loop among thousands stops no other
         return Failed(place, f"{type(error).__name__}: {error}; give the loop what pidemu.Loop documents")
     structure = program.structure
     return Prepared(
-        place, loop.tag, trial, shared.setdefault(structure, structure), program.values, program.initial, program.lengths
+        place, loop.tag, trial, shared.setdefault(structure, structure), program.values, program.initial, program.lengths, margins
     )
 
 
@@ -146,7 +152,7 @@ def measured(trial: Trial) -> Program:
         at.append(trial.scans if step is None else trial.first(step[0]))
         sizes.append(0.0 if step is None else step[1])
     start = 0 if trial.load_step is None else at[1]
-    measuring = Measuring(trial.scan, start, trial.initial[2], trial.limits)
+    measuring = Measuring(trial.scan, start, late_scan(trial.scans), trial.initial[2], trial.limits)
     loop = trial.program(trial.controller())
     return experiment(loop, Steps(trial.initial[0], sizes[0], at[0], sizes[1], at[1]), measuring)
 

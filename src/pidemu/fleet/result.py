@@ -6,23 +6,21 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import FleetError, suggest
 from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.writing import write_rows
 from pidemu.loop.trial import Trial
 
 Floats = npt.NDArray[np.float64]
-Status = Literal["done", "ran away", "failed", "not run"]
-RAN: Final[tuple[Status, ...]] = ("done", "ran away")
-"""What the status of a loop that ran may be."""
-HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "engine", "reason")
+HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "settled", "stable", *MARGINS, "engine", "reason")
 """Columns of the table. Times are in seconds, signals in percent."""
 
 
@@ -55,13 +53,19 @@ class FleetResult:
     loops : tuple of Loop
         The fleet.
     status : list of str
-        ``"done"``; ``"ran away"``: done, and the measurement outgrew all numbers; ``"failed"``: it could not be run; ``"not run"``:
-        the run was interrupted before.
+        ``"done"``; ``"unstable"``: it ran, and the loop is unstable; ``"ran away"``: it ran, and the measurement outgrew all
+        numbers; ``"failed"``: it could not be run; ``"not run"``: the run was interrupted before.
     reasons : list of str
         Why a loop failed.
     columns : dict of str to ndarray, shape (loops,)
-        ``iae`` [% s], ``peak`` [%], ``travel`` [%], ``at_low``, ``at_high`` [s] and the last ``error`` [%]; NaN where a loop
-        did not run. The errors count from the load step on, or from the start where there is none.
+        ``iae`` [% s], ``peak`` [%], ``travel`` [%], ``at_low``, ``at_high`` [s], ``swing``, what the error moves over in the last
+        fifth of the run [%], and the last ``error`` [%]; ``gain_margin``, ``phase_margin`` [deg] and ``Ms`` of the sampled loop
+        within its limits; NaN where a loop did not run, or has none. The errors count from the load step on, or from the start
+        where there is none.
+    settled : list of bool or None
+        Whether the measurement had settled at the end of the run: the swing is less than 5 % of the peak.
+    stable : list of bool or None
+        Whether the sampled loop is stable within its limits; ``None`` where that was not computed.
     scan, scans : ndarray, shape (loops,)
         Scan intervals [s] and numbers of scans.
     engines : list of str
@@ -75,7 +79,9 @@ class FleetResult:
         count = len(self.loops)
         self.status: list[Status] = ["not run"] * count
         self.reasons, self.engines = [""] * count, [""] * count
-        self.columns: dict[str, Floats] = {name: np.full(count, np.nan) for name in COLUMNS}
+        self.columns: dict[str, Floats] = {name: np.full(count, np.nan) for name in (*COLUMNS, *MARGINS)}
+        self.settled: list[bool | None] = [None] * count
+        self.stable: list[bool | None] = [None] * count
         self.scan, self.scans = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self.interrupted = False
         self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
@@ -91,13 +97,18 @@ class FleetResult:
             self.columns[name][places] = column
         for i, member in enumerate(found.members):
             place = member.place
-            self.status[place] = "ran away" if place in found.ran_away else "done"
+            self._take(place, judgement(found, i))
             self.scan[place], self.scans[place] = member.trial.scan, member.trial.scans
             self.engines[place] = found.engine.engine
             kept = found.records if found.file is None else found.file
             if kept is not None:
                 self._signals[place] = (member.trial, kept, i)
         return len(places)
+
+    def _take(self, place: int, judged: Judgement) -> None:
+        self.status[place], self.settled[place], self.stable[place] = judged.status, judged.settled, judged.stable
+        for name, value in judged.margins.items():
+            self.columns[name][place] = value
 
     @property
     def failures(self) -> dict[str, str]:
@@ -139,7 +150,8 @@ class FleetResult:
         """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""
         for i, loop in enumerate(self.loops):
             ran = self.status[i] in RAN
-            figures = {name: float(column[i]) if ran else None for name, column in self.columns.items()}
+            figures = {name: float(self.columns[name][i]) if ran else None for name in COLUMNS}
+            margins = {name: None if np.isnan(x := self.columns[name][i]) else float(x) for name in MARGINS}
             yield {
                 "tag": loop.tag,
                 "card": loop.settings.card.id,
@@ -147,6 +159,9 @@ class FleetResult:
                 "scan": float(self.scan[i]) if ran else None,
                 "scans": int(self.scans[i]) if ran else None,
                 **figures,
+                "settled": self.settled[i],
+                "stable": self.stable[i],
+                **margins,
                 "engine": self.engines[i] or None,
                 "reason": self.reasons[i] or None,
             }

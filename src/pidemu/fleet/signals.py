@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.judgement import MARGINS, judgement
 from pidemu.fleet.writing import writing
 
 Floats = npt.NDArray[np.float64]
@@ -31,7 +32,8 @@ class SignalStore:
 
     In a folder, ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%], NaN after a loop's last scan; `INDEX`
     names the file, the loop's number in it, scan interval [s] and number of scans for every tag. A Parquet file has a row per loop:
-    tag, card, scan interval, figures, and the lists ``output`` and ``measurement``; it appears when the run is over.
+    tag, card, status, scan interval, figures, margins, and the lists ``output`` and ``measurement``; it appears when the run is
+    over.
 
     Parameters
     ----------
@@ -134,7 +136,8 @@ class _Parquet:
             ) from None
         self._pa: Any = pa
         text, number, numbers = pa.string(), pa.float64(), pa.list_(pa.float64())
-        fields = [("tag", text), ("card", text), ("scan", number), *((name, number) for name in COLUMNS)]
+        fields = [("tag", text), ("card", text), ("status", text), ("scan", number), *((name, number) for name in COLUMNS)]
+        fields += [("settled", pa.bool_()), ("stable", pa.bool_()), *((name, number) for name in MARGINS)]
         self._schema = pa.schema([*fields, ("output", numbers), ("measurement", numbers)])
         self._path, self._unfinished = path, path.with_name(f"{path.name}.unfinished")
         if path.is_dir():
@@ -145,11 +148,16 @@ class _Parquet:
     def write(self, outcome: Outcome) -> None:
         assert outcome.records is not None
         lanes = [(i, m.trial.scans) for i, m in enumerate(outcome.members)]
+        judged = [judgement(outcome, i) for i, _ in lanes]
         columns: dict[str, Any] = {
             "tag": [m.tag for m in outcome.members],
             "card": [m.trial.settings.card.id for m in outcome.members],
+            "status": [j.status for j in judged],
             "scan": [m.trial.scan for m in outcome.members],
             **outcome.columns,
+            "settled": [j.settled for j in judged],
+            "stable": [j.stable for j in judged],
+            **{name: [j.margins.get(name) for j in judged] for name in MARGINS},
             "output": [outcome.records[0, :scans, i] for i, scans in lanes],
             "measurement": [outcome.records[1, :scans, i] for i, scans in lanes],
         }

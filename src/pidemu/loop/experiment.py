@@ -13,11 +13,12 @@ from pidemu.scan.blocks import magnitude
 from pidemu.scan.program import Expr, Name, Program, select
 
 Floats = npt.NDArray[np.float64]
-FIGURES: Final = {"iae": "% s", "peak": "%", "travel": "%", "at_low": "s", "at_high": "s"}
+FIGURES: Final = {"iae": "% s", "peak": "%", "travel": "%", "at_low": "s", "at_high": "s", "swing": "%"}
 """The states that hold what is measured, with their units.
 
 ``iae`` is the integral of the absolute error along straight lines between the scans, ``peak`` the largest absolute error, both from
-a given scan on; ``travel`` is what the output moves by in all, ``at_low`` and ``at_high`` the time at the output limits.
+a given scan on; ``travel`` is what the output moves by in all, ``at_low`` and ``at_high`` the time at the output limits, ``swing``
+what the error moves over in the last part of the run, from its lowest to its highest value.
 """
 _SCAN: Final = Name("scan_n")
 
@@ -53,6 +54,8 @@ class Measuring:
         Scan interval [s].
     start : int
         The scan from which the error counts.
+    late : int
+        The scan with which the last part of the run begins.
     output : float
         Output before the first scan [%].
     limits : tuple of float
@@ -61,6 +64,7 @@ class Measuring:
 
     scan: float
     start: int
+    late: int
     output: float
     limits: tuple[float, float]
 
@@ -90,6 +94,7 @@ def experiment(program: Program, steps: Steps, measuring: Measuring | None = Non
     if measuring is not None:
         h = p.coefficient("scan_h", measuring.scan, "scan interval", "s")
         _errors(p, Name(setpoint) - Name(program.also[0]), measuring.start, h)
+        _swing(p, Name("error"), measuring.late)
         _outputs(p, Name(program.output), measuring, h)
     p.then(n.id, n + 1.0, "scans so far", "-")
     return p.added(replace(program, inputs=()))
@@ -122,6 +127,15 @@ def _errors(p: Parts, error: Expr, start: int, h: Name) -> None:
     p.then(was.id, now, "kept for the next scan")
     size, peak = _size(p, "error", now), p.state("peak", "largest absolute error")
     p.then(peak.id, select((first <= _SCAN) & (size > peak), size, peak), "largest absolute error")
+
+
+def _swing(p: Parts, error: Name, late: int) -> None:
+    from_ = p.coefficient("late_from", late, "first scan of the last part of the run", "-")
+    top, bottom = p.state("error_top", "highest error of the last part"), p.state("error_bottom", "lowest error of the last part")
+    p.then(top.id, select((from_ < _SCAN) & (error < top), top, error), "highest error of the last part; before it, the error")
+    p.then(bottom.id, select((from_ < _SCAN) & (error > bottom), bottom, error), "lowest error of the last part")
+    swing = p.state("swing", "what the error moves over in the last part of the run")
+    p.then(swing.id, top - bottom, "what the error moves over in the last part of the run")
 
 
 def _outputs(p: Parts, u: Name, measuring: Measuring, h: Name) -> None:

@@ -135,7 +135,7 @@ def scan_for(settings: Settings, process: Process) -> float:
 def settling_time(settings: Settings, process: Process, h: float) -> float:
     """Return a time after which the loop hardly moves any more, roughly [s]."""
     a = settings.algorithm(scan=h)
-    law = settings.law(h if a.dahlin is not None else None)
+    law = Law(a, h if a.dahlin is not None else None)
     slow = process.time
     if a.ki:
         slow = abs(a.kp / a.ki) + (0.0 if process.integrators else 1 / abs(a.ki * process.gain))

@@ -8,20 +8,25 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal
 
 from pidemu.card.library import load_card
+from pidemu.card.load import Card
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import Request
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.spans import ranges_needed
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
 from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.plain import json_safe
+from pidemu.ranges import RANGES, SignalRange, option_of
 from pidemu.settings import Settings
 
 Outcome = Literal["exact", "exact-feedback", "approximate", "refused", "failed"]
 
 OUTCOMES: Final[tuple[Outcome, ...]] = ("exact", "exact-feedback", "approximate", "refused", "failed")
 """What a conversion can come to, the best first; ``failed`` is an error of this program, or of a card."""
+_STATED: Final = SignalRange(0.0, 100.0)
+"""The range that is stated where one is needed: typical gains are in percent per percent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +155,7 @@ def failed(source: str, target: str, error: BaseException) -> Cell:
 
 def _converted(work: Work, source: str, target: str) -> Cell:
     card = load_card(work.names[target], work.vendors)
-    settings = typical_settings(load_card(work.names[source], work.vendors), derivative=work.derivative)
+    settings = _ranged(typical_settings(load_card(work.names[source], work.vendors), derivative=work.derivative), card)
     held = {} if source == target else held_dials(card)
     base = Cell(
         source, target, "refused", given="; ".join((in_words(settings), *settings.notes)),
@@ -162,6 +167,13 @@ def _converted(work: Work, source: str, target: str) -> Cell:
         figures = {} if refusal.nearest is None else _figures(refusal.nearest)
         return replace(base, **figures, sentence=str(refusal))
     return replace(base, **_figures(found), verdict=found.verdict, sentence=found.sentence)
+
+
+def _ranged(settings: Settings, target: Card) -> Settings:
+    """Return settings with 0 to 100 for the ranges that have to be stated for a conversion to a card."""
+    needed = ranges_needed(settings, typical_settings(target))
+    pv, op = (_STATED if name in needed else None for name in RANGES)
+    return replace(settings, pv_range=pv, op_range=op)
 
 
 def _figures(c: Conversion) -> dict[str, Any]:
@@ -224,5 +236,7 @@ def _command(work: Work, settings: Settings, source: str, target: str, held: Map
     """Return the command line of this conversion."""
     values = [f"{n}={v.value:.15g}" for n, v in settings.items() if v.given and v.value != v.setting.default]
     words = ["pidemu", "convert", work.names[source], *values, *(f"{n}={c}" for n, c in _changed(settings).items())]
+    ranges = zip(RANGES, (settings.pv_range, settings.op_range), strict=True)
+    words += [f"{option_of(name)}={given.argument}" for name, given in ranges if given is not None]
     words += ["--to", work.names[target], *Request(given=held).words()]
     return shlex.join([*words, *(w for folder in work.vendors for w in ("--vendors", folder))])

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
-from pidemu.canonical import gain_sign
+from pidemu.canonical import default_scan, gain_sign
 from pidemu.card.base import Form
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.models import Equation, Setting
@@ -17,7 +17,7 @@ from pidemu.checks.runs import working
 from pidemu.conversion.target import is_computed
 from pidemu.errors import UndefinedError
 from pidemu.settings import Settings, limits, off_values
-from pidemu.units import FULL, Dimension, Role, from_canonical, parse_unit
+from pidemu.units import Dimension, Role, Spans, from_canonical, parse_unit
 
 GAIN: Final = 2.0
 """Typical gain [%/%]."""
@@ -36,6 +36,7 @@ _OTHERS: Final = {
     Role.DERIVATIVE_WEIGHT: 1.0,
     Role.TRACKING_TIME: math.sqrt(INTEGRAL_TIME * DERIVATIVE_TIME),
     Role.INTEGRAL_LIMIT: 100.0,
+    Role.WINDUP_LIMIT: 100.0,
 }
 """What a dial is set to where the card has no default, in canonical units; the tracking time as Astrom and Hagglund propose."""
 
@@ -90,7 +91,7 @@ def held_dials(card: Card) -> dict[str, float]:
     """
     variant = card.variant()
     return {
-        name: _sensible(setting)
+        name: _sensible(setting, variant.equation)
         for name, setting in _active(variant)
         if setting.default is None
         and Role(setting.sets) is not Role.MULTIPLIER
@@ -110,9 +111,9 @@ def _dials(variant: Variant, derivative: bool) -> tuple[dict[str, float], list[s
     for name, setting in _active(variant):
         role = Role(setting.sets)
         if role in terms:
-            value = _term(role, terms[role], setting)
+            value = _term(role, terms[role], setting, variant.equation)
         elif setting.default is None:
-            value = _sensible(setting)
+            value = _sensible(setting, variant.equation)
         else:
             continue
         low, high = limits(setting)
@@ -132,21 +133,26 @@ def _terms(equation: Equation, derivative: bool) -> dict[Role, float]:
     return {Role.GAIN: sign * GAIN, Role.INTEGRAL: 1 / INTEGRAL_TIME, Role.DERIVATIVE: time}
 
 
-def _term(role: Role, canonical: float, setting: Setting) -> float:
+def _term(role: Role, canonical: float, setting: Setting, equation: Equation) -> float:
     off = off_values(setting)
     if canonical == 0 and off:
         return off[0]
-    return _rounded(from_canonical(role, canonical, parse_unit(setting.unit), FULL))
+    return _rounded(from_canonical(role, canonical, parse_unit(setting.unit), _spans(equation)))
 
 
-def _sensible(setting: Setting) -> float:
+def _sensible(setting: Setting, equation: Equation) -> float:
     """Return a sensible value for a dial without default, inside its range."""
     role, unit = Role(setting.sets), parse_unit(setting.unit)
     low, high = limits(setting)
     share_of_a_time = role is Role.TRACKING_TIME and unit.dimension is Dimension.RATIO
     if role not in _OTHERS or share_of_a_time:
         return working(low, high)
-    return min(max(_rounded(from_canonical(role, _OTHERS[role], unit, FULL)), low), high)
+    return min(max(_rounded(from_canonical(role, _OTHERS[role], unit, _spans(equation))), low), high)
+
+
+def _spans(equation: Equation) -> Spans:
+    """Return full spans, and the card's scan interval for dials that count in scans."""
+    return Spans(scan=default_scan(equation))
 
 
 def _rounded(x: float) -> float:

@@ -34,9 +34,7 @@ class Scale:
     """
 
     def __init__(self, settings: Settings) -> None:
-        engineering = settings.equation.signals == "engineering"
-        self._pv = (engineering and settings.pv_range) or (0.0, 100.0)
-        self._op = (engineering and settings.op_range) or (0.0, 100.0)
+        self._pv, self._op = (r.ends for r in settings.own_ranges)
 
     @property
     def spans(self) -> tuple[tuple[float, float], tuple[float, float]]:

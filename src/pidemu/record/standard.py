@@ -33,10 +33,14 @@ _PLAN: Final = (
     ("manual", 3.0),
     ("return to automatic", 2.0),
     ("setpoint step again", 2.0),
+    ("into a limit, with noise", 3.0),
+    ("back from it, with noise", 3.0),
 )
 """Segments and how long they last, in characteristic times."""
 _NOISE_STEPS: Final = 100
 """Values of the noise per characteristic time."""
+_FAINT: Final = 0.25
+"""Size of the noise at a limit per size of that in ``PV noise``, where the derivative would drown everything else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,24 +85,28 @@ def standard_record(scan: float, seed: int = 1, time: float = _DEFAULT_TIME, siz
 
     It rests at 50, and moves by `size` in each of these parts, which last as long as stated, in units of `time`:
 
-    ====================  ====  =================================================================================================
-    at rest               1     setpoint and measurement are 50
-    setpoint steps        3     the setpoint steps up, from there down to as much below 50, and back; one `time` each
-    PV ramps              2.5   the measurement goes up, down and back along straight lines; then rest
-    PV steps              2.5   the measurement steps up, down and back
-    PV sine sweep         4     a sine whose period falls from 2 `time` to `time`/5, exponentially
-    PV noise              2     uniform noise of half the size, a new value every `time`/100
-    large positive error  2     setpoint up, measurement down: an error of 8 sizes, as far as 5 to 95 % allow
-    large negative error  3     the same with the other sign
-    back from the limit   1     both are 50 again
-    manual                3     the operator's output is 60, goes to 40 along a straight line, and stays; the measurement is off by
-                                half the size
-    return to automatic   2     automatic, with that error for another `time`; then rest
-    setpoint step again   2     the setpoint steps up, and back after one `time`
-    ====================  ====  =================================================================================================
+    ========================  ====  =============================================================================================
+    at rest                   1     setpoint and measurement are 50
+    setpoint steps            3     the setpoint steps up, from there down to as much below 50, and back; one `time` each
+    PV ramps                  2.5   the measurement goes up, down and back along straight lines; then rest
+    PV steps                  2.5   the measurement steps up, down and back
+    PV sine sweep             4     a sine whose period falls from 2 `time` to `time`/5, exponentially
+    PV noise                  2     uniform noise of half the size, a new value every `time`/100
+    large positive error      2     setpoint up, measurement down: an error of 8 sizes, as far as 5 to 95 % allow
+    large negative error      3     the same with the other sign
+    back from the limit       1     both are 50 again
+    manual                    3     the operator's output is 60, goes to 40 along a straight line, and stays; the measurement is off
+                                    by half the size
+    return to automatic       2     automatic, with that error for another `time`; then rest
+    setpoint step again       2     the setpoint steps up, and back after one `time`
+    into a limit, with noise  3     the measurement rises by 8 sizes, at most to 95, along a straight line in one `time`, and stays;
+                                    with noise of an eighth of the size
+    back from it, with noise  3     it falls back to the setpoint along a straight line in one `time`, and stays; the same noise
+    ========================  ====  =============================================================================================
 
-    Up and down are alike, so that the integral ends each of the first parts about where it began. The signals are functions of
-    time: another scan interval samples the same ones. The noise is that of the seed, on every machine.
+    Up and down are alike, so that the integral ends each of the first parts about where it began. In the last two parts derivative
+    and noise meet an output limit: schemes that agree on steps without noise may differ there. The signals are functions of time:
+    another scan interval samples the same ones. The noise is that of the seed, on every machine.
 
     Parameters
     ----------
@@ -125,7 +133,7 @@ def standard_record(scan: float, seed: int = 1, time: float = _DEFAULT_TIME, siz
     --------
     >>> record = standard_record(scan=1.0, time=60.0)
     >>> record.sp.size, record.segments[1]
-    (1680, Segment(name='setpoint steps', start=60.0, end=240.0))
+    (2040, Segment(name='setpoint steps', start=60.0, end=240.0))
     >>> record.sp[[59, 60, 120, 180]].tolist()
     [50.0, 54.0, 46.0, 50.0]
     """
@@ -163,12 +171,15 @@ def _signals(x: Floats, starts: dict[str, float], size: float, seed: int) -> tup
     pv += size * np.interp(x - starts["PV ramps"], [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, -1.0, 0.0])
     pv += size * _levels(x - starts["PV steps"], (1.0, 1.0), (1.0, -1.0))
     pv += size * _sweep(x - starts["PV sine sweep"])
-    pv += size * _noise(x - starts["PV noise"], seed)
+    pv += size * _noise(x - starts["PV noise"], 2, seed)
     error = far * _levels(x - starts["large positive error"], (2.0, 3.0), (1.0, -1.0))
     sp += error
     pv -= error
     pv += size * _levels(x - starts["manual"], (4.0,), (0.5,))
     sp += size * _levels(x - starts["setpoint step again"], (1.0,), (1.0,))
+    s = x - starts["into a limit, with noise"]
+    pv += min(8 * size, 45.0) * np.interp(s, [0.0, 1.0, 3.0, 4.0], [0.0, 1.0, 1.0, 0.0])
+    pv += _FAINT * size * _noise(s, 6, seed)
     return sp, pv
 
 
@@ -186,12 +197,12 @@ def _sweep(x: Floats) -> Floats:
     return np.where((x >= 0) & (x < 4), np.sin(phase), 0.0)
 
 
-def _noise(x: Floats, seed: int) -> Floats:
-    """Return uniform noise between -1/2 and 1/2 over ``0 <= x < 2``; 0 outside."""
+def _noise(x: Floats, length: int, seed: int) -> Floats:
+    """Return uniform noise between -1/2 and 1/2 over ``0 <= x < length``; 0 outside."""
     source = random.Random(seed)  # its random() gives the same numbers in every version
-    values = np.array([source.random() - 0.5 for _ in range(2 * _NOISE_STEPS)])
+    values = np.array([source.random() - 0.5 for _ in range(length * _NOISE_STEPS)])
     place = np.clip(np.floor(x * _NOISE_STEPS), 0, values.size - 1).astype(int)
-    return np.where((x >= 0) & (x < 2), values[place], 0.0)
+    return np.where((x >= 0) & (x < length), values[place], 0.0)
 
 
 def scale_of(settings: Settings, scan: float) -> tuple[float, float]:

@@ -20,7 +20,9 @@ from pidemu.conversion.statement import (
     bump_line,
     chosen_line,
     figure_lines,
+    lag_line,
     pace_line,
+    proof_lines,
     ranges_line,
     sections,
     source_rows,
@@ -101,6 +103,7 @@ class Contents:
         self.bands = band_rows(self.certificate)
         self.lines = figure_lines(conversion)
         self.loop = loop_rows(self.certificate.loop) if self.certificate.loop is not None else []
+        self.proof = proof_lines(conversion)
         self.unverified = unverified(conversion)
 
     @staticmethod
@@ -138,6 +141,8 @@ class Contents:
         scans, real = self.c.request.declared, self.c.request.runs_every
         if s.options:
             yield "options", ", ".join(f"{n}={x}{self._how(side, n)}" for n, x in s.options.items())
+        if lag_line(s):
+            yield "filter", lag_line(s)
         yield "action", action
         yield "ranges", ranges_line(s).removeprefix("ranges: ") or "not given"
         scan = "not given" if scans is None else f"{number(scans[side])} s"
@@ -179,6 +184,8 @@ class Contents:
         by = "as stated" if request.action else "by the sign of the gain"
         yield "action", "not stated" if c.action is None else f"{c.action}, {by}"
         yield "scan interval", self._scans()
+        if request.bias is not None:
+            yield "bias", f"{number(request.bias)} % at SP = PV"
         if c.factor != 1:
             yield "gain", f"multiplied by {number(c.factor)} for the new ranges or the new action"
         yield "process", "not given" if c.process is None else c.process.text

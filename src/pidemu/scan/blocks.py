@@ -131,9 +131,11 @@ def rounded(x: Expr, step: Expr) -> Expr:
     return Floor(x / step + 0.5) * step
 
 
-def towards(x: Expr, last: Expr, reach: Expr) -> Expr:
-    """Return `x`, but at most `reach` away from `last` (section 8, rate limit)."""
-    return limited(x, last - reach, last + reach)
+def towards(x: Expr, last: Expr, reach: Expr | None, down: Expr | None) -> Expr:
+    """Return `x`, but at most `reach` above and `down` below `last` (section 8, rate limit); ``None`` is no limit."""
+    if down is not None:
+        x = select(x < last - down, last - down, x)
+    return x if reach is None else select(x > last + reach, last + reach, x)
 
 
 def signal_lag(b: Builder, x: Expr, afresh: Expr, f: Lag, h: float, what: str) -> Name:

@@ -52,7 +52,7 @@ def within_limits(b: Builder, a: Algorithm, h: float, t: Terms, v: Expr, last: E
         out = b.let("out", blocks.limited(total, t.low, t.high), "output limits (section 5)")
     if math.isfinite(a.output_rate):
         reach = b.coefficient("u_reach", a.output_rate * h, "fastest change of the output in one scan", "%")
-        out = b.let("out", blocks.towards(out, last, reach), "output rate limit (section 8)")
+        out = b.let("out", blocks.towards(out, last, reach, reach), "output rate limit (section 8)")
         out = b.let("out", blocks.limited(out, t.low, t.high), "the operator may have been beyond the limits")
     return out
 

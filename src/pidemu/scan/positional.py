@@ -138,8 +138,10 @@ def _gated(
     """Stop or hasten the integral at a limit where the windup scheme says so (section 5)."""
     if grown is None or (a.windup not in ("freeze", "conditional") and a.gate.fast_return == 1):
         return grown
+    if a.windup == "conditional" and not a.gate.drops and a.integral_rule is not Rule.FORWARD:
+        return b.let("dI", grown, "increment of the integral")  # what leads beyond a limit is taken back after the output
     grown = b.let("dI", grown, "increment of the integral")
-    pushes = scheme.output(grown)
+    pushes = scheme.output(scheme.term(grown))
     if a.gate.fast_return != 1:
         _hastened(b, a, t, scheme, P, state, grown, pushes, feed)
     if a.windup == "freeze" and not a.gate.this_scan:
@@ -152,24 +154,26 @@ def _gated(
             stop = blocks.saturated_by_sign(v0, t.low, t.high, t.signals.e if b.sign > 0 else 0.0 - t.signals.e)
         else:
             stop = blocks.saturated(v0, t.low, t.high, pushes)
-        return b.let("dI", select(stop, 0.0, grown), "conditional: none that pushes further beyond a limit (section 5)")
+        return b.let("dI", select(stop, 0.0, grown), "conditional: none that leads beyond a limit (section 5)")
     return grown
 
 
 def _hastened(
     b: Builder, a: Algorithm, t: Terms, scheme: _Sum, P: Expr, state: Name, grown: Expr, pushes: Expr, feed: Expr | None
 ) -> None:
-    """While the sum is beyond a limit and the integral on its way back, hasten it, but not past the limit (section 5)."""
+    """While the output is beyond a limit of the windup and the integral on its way back, hasten it, up to there (section 5)."""
     now = scheme.output(blocks.summed([P, scheme.term(state), t.D]))
     before = b.let("v_I", now if feed is None else now + feed, "sum before this scan's increment")
-    ahead = b.let("v_dI", before + pushes, "sum with it")
+    ahead = b.let("v_dI", blocks.limited(before + pushes, t.low, t.high), "output with it")
     factor = b.coefficient("fast", a.gate.fast_return, "factor on the way back from a limit", "-")
-    high, low = (scheme.state(scheme.total(limit - before)) for limit in (t.high, t.low))
+    arw_low = b.coefficient("arw_low", a.gate.fast_beyond[0], "low limit of the windup", "%")
+    arw_high = b.coefficient("arw_high", a.gate.fast_beyond[1], "high limit of the windup", "%")
+    high, low = (scheme.state(scheme.total(limit - before)) for limit in (arw_high, arw_low))
     hastened = b.let("dI_fast", factor * grown, "increment of a shorter integral time")
     flipped = scheme.gain is not None and a.kp < 0  # the state moves against the output
     down = select(hastened > high, high, hastened) if flipped else select(hastened < high, high, hastened)
     up = select(hastened < low, low, hastened) if flipped else select(hastened > low, low, hastened)
-    from_high, from_low = (ahead > t.high) & (pushes < 0.0), (ahead < t.low) & (pushes > 0.0)
+    from_high, from_low = (ahead > arw_high) & (pushes < 0.0), (ahead < arw_low) & (pushes > 0.0)
     b.let("fast_now", select(from_high | from_low, 1.0, 0.0), "on the way back from a limit", "-")
     b.let("dI", select(from_high, down, select(from_low, up, grown)), "fast return from a limit (section 5)")
 
@@ -283,6 +287,8 @@ def _after_output(
         b.let("I", pulled, f"{a.windup}, Tt = {a.tracking_time:.6g} s (section 5)")
     if a.windup == "recompute" and not a.gate.without_derivative:
         _recomputed(b, a, t, scheme, P, t.D, state, feed)
+    if a.windup == "conditional" and not a.gate.drops and not forward and grown is not None:
+        _taken_back(b, a, t, scheme, v, grown)
     if a.windup == "freeze" and a.gate.this_scan:
         beyond = (v >= t.high) | (v <= t.low)
         b.let("I", select(beyond, Name("I_old"), state), "freeze: an increment that leads beyond a limit is not kept (section 5)")
@@ -301,6 +307,18 @@ def _after_output(
         b.let("I", select(reach > t.high - t.low, 0.0, state), "cleared outside the proportional band (section 5)")
     if a.windup in _FEEDS_BACK:
         b.let("I", blocks.flushed(state, b.tiny), "no denormal numbers (section 7)")
+
+
+def _taken_back(b: Builder, a: Algorithm, t: Terms, scheme: _Sum, v: Expr, grown: Expr) -> None:
+    """Of an increment that leads beyond a limit keep what leads to the limit (section 5, conditional)."""
+    pushes = b.let("moved_I", scheme.output(scheme.term(grown)), "what the increment moves the sum by")
+    over, under = v - t.high, v - t.low
+    high = select(over < pushes, over, pushes)
+    low = select(under > pushes, under, pushes)
+    extra = select((over > 0.0) & (pushes > 0.0), high, select((under < 0.0) & (pushes < 0.0), low, 0.0))
+    going = equal(b.state("begun", "there has been a scan", "-"), 1.0) if a.start == "running" else t.on
+    kept = Name("I") - scheme.state(scheme.total(b.let("cut_I", select(going, extra, 0.0), "how far it leads beyond")))
+    b.let("I", kept, "conditional: the integral up to the limit (section 5)")
 
 
 def _share(a: Algorithm, h: float) -> float:

@@ -132,15 +132,28 @@ def _setpoint(b: Builder, a: Algorithm, h: float, fresh: Expr, cascade: Expr | N
         r = local
     if cascade is not None:
         r = b.let("r", select(cascade, Name("cascade"), r), "in cascade the remote setpoint (section 6)")
-    if math.isfinite(a.sp_rate):
-        last = b.state("r1", "limited setpoint of the last scan")
-        if not a.sp_from_zero:
-            b.let(last.id, select(b.fresh, r, last), "start at the first setpoint")
-        reach = b.coefficient("r_reach", a.sp_rate * h, "fastest change of the setpoint in one scan", "%")
-        r = b.let(last.id, blocks.towards(r, last, reach), "setpoint rate limit (section 8)")
+    if math.isfinite(a.sp_rate) or math.isfinite(a.sp_rate_down):
+        r = _rate_limited(b, a, h, r, cascade)
     if a.sp_filter is not None:
         r = blocks.signal_lag(b, r, fresh, a.sp_filter, h, "sp_in")
     return r
+
+
+def _rate_limited(b: Builder, a: Algorithm, h: float, r: Expr, cascade: Expr | None) -> Expr:
+    """Return the setpoint behind its rate limit (section 8)."""
+    last = b.state("r1", "limited setpoint of the last scan")
+    if not a.sp_from_zero:
+        b.let(last.id, select(b.fresh, r, last), "start at the first setpoint")
+    what = "fastest change of the setpoint in one scan"
+    up = b.coefficient("r_reach", a.sp_rate * h, what, "%") if math.isfinite(a.sp_rate) else None
+    down = up
+    if a.sp_rate_down != a.sp_rate:
+        what = "fastest fall of the setpoint in one scan"
+        down = b.coefficient("r_fall", a.sp_rate_down * h, what, "%") if math.isfinite(a.sp_rate_down) else None
+    within = blocks.towards(r, last, up, down)
+    if a.sp_rate_local and cascade is not None:
+        within = select(cascade, r, within)
+    return b.let(last.id, within, "setpoint rate limit (section 8)")
 
 
 def _weighted(b: Builder, weight: float, name: str, s: Signals) -> Expr:

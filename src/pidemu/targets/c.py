@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from pidemu.errors import EngineError
@@ -16,7 +16,8 @@ from pidemu.scan.precision import explicit
 from pidemu.scan.program import Binary, Cast, Expr, Floor, Program, Select
 from pidemu.targets.c_expressions import RESERVED
 from pidemu.targets.c_header import MEMBER, prototypes, run_head, step_head, types
-from pidemu.targets.c_unit import Unit, function, plain, said, scan
+from pidemu.targets.c_unit import Unit, function, said, scan
+from pidemu.targets.comments import comment_text
 
 _ABSENT: Final = ("manual", "cascade", "track", "reset")
 
@@ -50,7 +51,7 @@ static inline {kind} {name}({kind} x)
 _CPP: Final = ('#ifdef __cplusplus\nextern "C" {\n#endif', "#ifdef __cplusplus\n}\n#endif")
 
 
-def header(program: Program, name: str) -> str:
+def header(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     """Return the header ``NAME.h``: types, the settings of this program, and the functions.
 
     Parameters
@@ -59,6 +60,8 @@ def header(program: Program, name: str) -> str:
         What to print.
     name : str
         What types and functions begin with: a C identifier.
+    notes : sequence of str
+        What stands in the comment at the top, below the title, a line each.
 
     Raises
     ------
@@ -67,16 +70,16 @@ def header(program: Program, name: str) -> str:
     """
     unit = _unit(program, name)
     guard = f"{name.upper()}_H"
-    before = [_about(unit), f"#ifndef {guard}\n#define {guard}", "#include <stddef.h>", _CPP[0]]
+    before = [_about(unit, notes), f"#ifndef {guard}\n#define {guard}", "#include <stddef.h>", _CPP[0]]
     return _joined([*before, types(unit), prototypes(unit), _CPP[1], f"#endif /* {guard} */"])
 
 
-def source(program: Program, name: str) -> str:
+def source(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     """Return the source ``NAME.c``, which includes the header.
 
     Parameters
     ----------
-    program, name
+    program, name, notes
         As in `header`.
 
     Raises
@@ -85,15 +88,15 @@ def source(program: Program, name: str) -> str:
         The name is no C identifier.
     """
     unit = _unit(program, name)
-    return _joined([_about(unit), f'#include "{name}.h"', *_preamble(unit), *_functions(unit)])
+    return _joined([_about(unit, notes), f'#include "{name}.h"', *_preamble(unit), *_functions(unit)])
 
 
-def single(program: Program, name: str) -> str:
+def single(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     """Return header and source as one text that compiles on its own.
 
     Parameters
     ----------
-    program, name
+    program, name, notes
         As in `header`.
 
     Raises
@@ -102,7 +105,7 @@ def single(program: Program, name: str) -> str:
         The name is no C identifier.
     """
     unit = _unit(program, name)
-    return _joined([_about(unit), "#include <stddef.h>", *_preamble(unit), types(unit), prototypes(unit), *_functions(unit)])
+    return _joined([_about(unit, notes), "#include <stddef.h>", *_preamble(unit), types(unit), prototypes(unit), *_functions(unit)])
 
 
 def library(program: Program, name: str) -> str:
@@ -144,11 +147,12 @@ def _joined(parts: list[str]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _about(unit: Unit) -> str:
+def _about(unit: Unit, notes: Sequence[str]) -> str:
     """Return the comment at the top: which controller, and how to build it."""
     absent = ", ".join(unit.names[q.name] for q in unit.program.inputs if q.name in _ABSENT)
-    title = textwrap.fill(plain(" ".join(unit.program.title.split())), 116, break_long_words=False)
-    text = f"{title}\n\n{_BUILD.format(absent=absent)}"
+    title = textwrap.wrap(comment_text(unit.program.title), 116, break_long_words=False)
+    told = [*map(comment_text, notes), ""] if notes else []
+    text = "\n".join([*title, "", *told, _BUILD.format(absent=absent)])
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in text.splitlines()), " */"])
 
 

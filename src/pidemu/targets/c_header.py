@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from pidemu.scan.program import Line, Program, Quantity
-from pidemu.targets.c_unit import Unit, plain, said, signature
+from pidemu.targets.c_unit import Unit, said, signature
+from pidemu.targets.comments import comment_text
 
 MEMBER: Final = 36
 """Column of the comments beside members."""
@@ -47,7 +48,7 @@ def _with_unit(q: Quantity | Line) -> str:
 
 def prototypes(unit: Unit) -> str:
     """Return what the header declares, with what it means."""
-    meant = [f" *   {unit.names[q.name]:<12}{plain(_with_unit(q))}" for q in unit.program.inputs]
+    meant = [f" *   {unit.names[q.name]:<12}{comment_text(_with_unit(q))}" for q in unit.program.inputs]
     shorter = "/* The same with fewer inputs and decisions: for scans after one in automatic, while automatic lasts. */"
     automatic = ["", shorter, f"{run_head(unit, unit.automatic, 'run_automatic')};"] if unit.automatic else []
     return "\n".join(

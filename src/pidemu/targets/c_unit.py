@@ -10,6 +10,7 @@ from pidemu.scan.precision import explicit
 from pidemu.scan.program import Line, Precision, Program, names_in
 from pidemu.scan.specialise import specialise
 from pidemu.targets.c_expressions import Writer, identifiers, literal
+from pidemu.targets.comments import comment_text
 
 _COMMENT: Final = 72
 _WIDTH: Final = 120
@@ -92,13 +93,8 @@ class Unit:
 
 def said(code: str, text: str, column: int = _COMMENT) -> str:
     """Return a line of code with a comment in a column, where there is one."""
-    text = plain(text)
+    text = comment_text(text)
     return f"{code:<{column - 1}} /* {text} */" if text else code
-
-
-def plain(text: str) -> str:
-    """Return text that ends no comment and begins none."""
-    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def signature(what: str, arguments: Sequence[str]) -> str:

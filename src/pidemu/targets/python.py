@@ -13,6 +13,7 @@ import numpy as np
 from pidemu.scan.precision import explicit
 from pidemu.scan.program import Program, Structure, names_in
 from pidemu.scan.specialise import specialise
+from pidemu.targets.comments import python_comments
 from pidemu.targets.expressions import literal, render
 from pidemu.targets.runner import Floats, Run, Runner
 
@@ -109,15 +110,17 @@ def _initial(program: Program) -> list[str]:
     return [*numbers, *(f"deque([0.0] * {length})" for length in program.lengths)]
 
 
-def source(program: Program) -> str:
+def source(program: Program, notes: Sequence[str] = ()) -> str:
     """Return a module that runs the program: its coefficients, `scan` for one scan and `run` for many.
 
     Parameters
     ----------
     program : Program
         What to print.
+    notes : sequence of str
+        What stands in the comment at the top, below the title, a line each.
     """
-    lines = [f"# {' '.join(program.title.split())}", ""]
+    lines = [*python_comments(program.title, notes), ""]
     lines += _imports(program)
     for quantity, value in zip(program.coefficients, program.values, strict=True):
         lines.append(f"{f'{quantity.name} = {_number(program, quantity.name, value)}':<32}  # {quantity.text} [{quantity.unit}]")

@@ -1,0 +1,263 @@
+"""Numbers without rounding: fractions, and ``a + b sqrt(d)`` with fractions a and b.
+
+A proof that two laws are the same (specs/equations.md, section 9) computes with these. Dials are decimals, unit conversions are
+fractions, and the only roots are those of one quadratic, the factors of a series form; so every number of one proof lies in
+Q(sqrt d) for one whole number d. A rounded number cannot get in: an operation with a float works only where its decimal text and
+its binary value are the same number, such as 0.5 or 2.0, and raises `InexactError` otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import lru_cache, total_ordering
+from typing import Any, Final
+
+_DIGITS: Final = 15
+"""Significant digits up to which a float is the decimal that was typed: every such decimal has a float of its own."""
+_SIMPLE: Final = 10**10
+"""A fraction whose numerator times denominator is below this is no coincidence: about one double in a million is as near to one."""
+_LONG: Final = 10**12
+"""Whole numbers from here on are not printed as fractions."""
+_SHORT: Final = 1000
+"""A fraction of numbers below this is printed as such even where it ends as a decimal."""
+_SHOWN: Final = 20
+"""Significant digits of numbers that are too long to print as fractions."""
+_ROOT_DIGITS: Final = 60
+"""Decimal digits of a root where its size is needed."""
+
+
+class InexactError(ArithmeticError):
+    """A number is not known exactly: rounded, infinite, or of two different square roots."""
+
+
+@total_ordering
+class Exact:
+    """A number ``a + b sqrt(d)`` without rounding.
+
+    Parameters
+    ----------
+    a, b : Fraction, int or str
+        The two coefficients.
+    d : int
+        What the root is taken of: positive and not a square; 0 where `b` is 0.
+
+    Examples
+    --------
+    >>> root = sqrt(Fraction(5))
+    >>> (3 + root) / 2 * ((3 - root) / 2)
+    Exact(1)
+    >>> print((3 + root) / 2)
+    (3 + sqrt(5))/2
+    """
+
+    __slots__ = ("a", "b", "d")
+
+    def __init__(self, a: Fraction | int | str, b: Fraction | int | str = 0, d: int = 0) -> None:
+        self.a, self.b = Fraction(a), Fraction(b)
+        self.d = d if self.b else 0
+
+    def _both(self, other: Exact | Fraction | float) -> tuple[Exact, int]:
+        """Return the other number, and what the root of both is taken of."""
+        o = exact(other)
+        if self.d and o.d and self.d != o.d:
+            raise InexactError(f"sqrt({self.d}) and sqrt({o.d}) have no common field of two dimensions")
+        return o, self.d or o.d
+
+    def __add__(self, other: object) -> Exact:
+        if not isinstance(other, _NUMBERS):
+            return NotImplemented
+        o, d = self._both(other)
+        return _made(self.a + o.a, self.b + o.b, d) if d else _made(self.a + o.a)
+
+    def __neg__(self) -> Exact:
+        return _made(-self.a, -self.b, self.d)
+
+    def __sub__(self, other: object) -> Exact:
+        return self + -exact(other) if isinstance(other, _NUMBERS) else NotImplemented
+
+    def __rsub__(self, other: Fraction | float) -> Exact:
+        return -self + exact(other)
+
+    def __mul__(self, other: object) -> Exact:
+        if not isinstance(other, _NUMBERS):
+            return NotImplemented
+        o, d = self._both(other)
+        if not d:
+            return _made(self.a * o.a)
+        return _made(self.a * o.a + self.b * o.b * d, self.a * o.b + self.b * o.a, d)
+
+    def __truediv__(self, other: object) -> Exact:
+        if not isinstance(other, _NUMBERS):
+            return NotImplemented
+        o, d = self._both(other)
+        if not d:
+            return _made(self.a / o.a)
+        norm = o.a * o.a - o.b * o.b * d  # 0 for 0 only, as d is not a square
+        return self * _made(o.a / norm, -o.b / norm, d)
+
+    def __rtruediv__(self, other: Fraction | float) -> Exact:
+        return exact(other) / self
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, float) and not math.isfinite(other):
+            return False
+        if not isinstance(other, _NUMBERS):
+            return NotImplemented
+        o = exact(other)
+        return (self.a, self.b, self.d) == (o.a, o.b, o.d)
+
+    def __lt__(self, other: object) -> bool:
+        if isinstance(other, float) and math.isinf(other):
+            return other > 0
+        return (self - other).sign < 0
+
+    def __hash__(self) -> int:
+        return hash((self.a, self.b, self.d)) if self.b else hash(self.a)
+
+    def __bool__(self) -> bool:
+        return bool(self.a or self.b)
+
+    def __abs__(self) -> Exact:
+        return -self if self.sign < 0 else self
+
+    @property
+    def sign(self) -> int:
+        """-1, 0 or 1."""
+        a, b = _sign(self.a), _sign(self.b)
+        return (a or b) if a * b >= 0 else a * _sign(self.a * self.a - self.b * self.b * self.d)
+
+    @property
+    def near(self) -> Fraction:
+        """A fraction that agrees to dozens of digits."""
+        if not self.b:
+            return self.a
+        return self.a + self.b * _root(self.d)
+
+    def __float__(self) -> float:
+        return float(self.near)
+
+    def __format__(self, spec: str) -> str:
+        return format(float(self), spec) if spec else str(self)
+
+    def __repr__(self) -> str:
+        return f"Exact({self.a})" if not self.b else f"Exact({self.a}, {self.b}, {self.d})"
+
+    def __str__(self) -> str:
+        """The number as written by hand: a fraction, or a decimal where that is shorter; dots stand for digits left out."""
+        q = math.lcm(self.a.denominator, self.b.denominator)
+        p, r = int(self.a * q), int(self.b * q)
+        if max(abs(p), abs(r), q, self.d) >= _LONG:
+            return _decimal(self.near)
+        if not r:
+            short = q == 1 or max(abs(p), q) < _SHORT or "..." in (decimal := _decimal(self.a))
+            return str(self.a) if short else decimal
+        root = f"sqrt({self.d})" if abs(r) == 1 else f"{abs(r)} sqrt({self.d})"
+        top = ("-" if r < 0 else "") + root if not p else f"{p} {'-' if r < 0 else '+'} {root}"
+        return top if q == 1 else f"({top})/{q}" if p else f"{top}/{q}"
+
+
+_NUMBERS: Final = (Exact, Fraction, int, float)
+
+
+_NOTHING: Final = Fraction(0)
+
+
+def _made(a: Fraction, b: Fraction = _NOTHING, d: int = 0) -> Exact:
+    """Return a number from its parts, which are fractions already."""
+    x = object.__new__(Exact)
+    x.a, x.b, x.d = a, b, d if b else 0
+    return x
+
+
+@lru_cache(maxsize=32)
+def _root(d: int) -> Fraction:
+    """Return a square root to dozens of digits."""
+    scale: int = 10**_ROOT_DIGITS
+    return Fraction(math.isqrt(d * scale * scale), scale)
+
+
+def _sign(x: Fraction) -> int:
+    return (x > 0) - (x < 0)
+
+
+def _decimal(x: Fraction) -> str:
+    """Return a decimal: all of it where it ends within the digits shown, otherwise its beginning and dots."""
+    with localcontext() as context:
+        context.prec = _SHOWN
+        value = Decimal(x.numerator) / Decimal(x.denominator)
+    text = f"{value:f}" if -7 < value.adjusted() < _SHOWN else str(value)
+    return text if Fraction(value) == x else f"{text}..."
+
+
+def exact(x: Any) -> Exact:
+    """Return a number that is known exactly as it stands.
+
+    Raises
+    ------
+    InexactError
+        A float that is the rounding of something: its decimal text is not its binary value, or it is infinite.
+    """
+    if isinstance(x, Exact):
+        return x
+    if isinstance(x, Fraction | int):
+        return Exact(x)
+    if isinstance(x, float) and x.is_integer():
+        return _made(Fraction(int(x)))
+    if isinstance(x, float) and math.isfinite(x) and Fraction(x) == Fraction(repr(float(x))):
+        return Exact(Fraction(x))
+    raise InexactError(f"{x!r} is not known exactly")
+
+
+def as_typed(x: float) -> Exact:
+    """Return the number that a float stands for: the decimal that was typed, or the simple fraction that it was computed as.
+
+    Parameters
+    ----------
+    x : float
+        A dial, a constant of a card.
+
+    Raises
+    ------
+    InexactError
+        It is infinite or not a number.
+
+    Examples
+    --------
+    >>> as_typed(0.1), as_typed(20 / 60), as_typed(133 / 36)
+    (Exact(1/10), Exact(1/3), Exact(133/36))
+    """
+    if not math.isfinite(x):
+        raise InexactError(f"{x!r} is not known exactly")
+    typed = Fraction(repr(float(x)))
+    if len(Decimal(repr(float(x))).as_tuple().digits) <= _DIGITS or not x:
+        return Exact(typed)
+    most = max(1, math.isqrt(int(_SIMPLE / min(abs(x), _SIMPLE))))
+    simple = typed.limit_denominator(most)
+    small = abs(simple.numerator) * simple.denominator < _SIMPLE
+    return Exact(simple if small and float(simple) == x else typed)
+
+
+def sqrt(x: Fraction) -> Exact:
+    """Return the square root of a fraction that is not negative.
+
+    Raises
+    ------
+    ValueError
+        It is negative.
+    """
+    if x < 0:
+        raise ValueError(f"{x} is negative")
+    whole, bottom = x.numerator * x.denominator, Fraction(1, x.denominator)
+    for prime in _PRIMES:
+        while whole and whole % (prime * prime) == 0:
+            whole, bottom = whole // (prime * prime), bottom * prime
+    root = math.isqrt(whole)
+    return Exact(root * bottom) if root * root == whole else Exact(0, bottom, whole)
+
+
+_PRIMES: Final = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89, 97)

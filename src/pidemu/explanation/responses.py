@@ -1,0 +1,109 @@
+"""What a controller's output does after steps of measurement and setpoint, and what it makes of noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pidemu.algorithm import Algorithm
+from pidemu.law import Law
+from pidemu.rational import Rational
+
+
+@dataclass(frozen=True, slots=True)
+class Responses:
+    """What the output does, of a reverse-acting controller with positive gain, per percent of the signal.
+
+    Attributes
+    ----------
+    measurement_kick, setpoint_kick : float
+        What the output moves by at once [%/%]; infinite with a derivative that has no filter. At a scan interval: in the first
+        scan.
+    noise_gain : float
+        The gain for the fastest changes of the measurement [%/%]: at infinite frequency; where a filter lets nothing through there,
+        the largest above the corner of the fastest filter; at a scan interval, at half the scan rate.
+    """
+
+    measurement_kick: float
+    setpoint_kick: float
+    noise_gain: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ramp:
+    """What a step of the measurement comes to, when derivative and filters have died out.
+
+    Attributes
+    ----------
+    jump : float
+        Where the ramp begins: what the output has moved by, besides the ramp [%/%].
+    slope : float
+        What it moves on by [%/% per s].
+    """
+
+    jump: float
+    slope: float
+
+
+def in_cascade(a: Algorithm) -> Algorithm:
+    """Return the algorithm with what P sees in cascade."""
+    return a if a.cascade_b is None else replace(a, b=a.cascade_b)
+
+
+def responses_of(a: Algorithm, scan: float | None = None) -> Responses:
+    """Return what the output does at once.
+
+    Parameters
+    ----------
+    a : Algorithm
+        The algorithm.
+    scan : float, optional
+        Scan interval [s]; without it the continuous law.
+
+    Raises
+    ------
+    ScanError
+        A filter is unstable at the scan interval.
+    UndefinedError
+        The algorithm is a recursion in scans, and no interval is given.
+    """
+    law = Law(a, scan)
+    if scan is None:
+        kick = _at_once(law.feedback)
+        return Responses(kick, law.kick(), abs(kick) or _beyond_the_corner(law))
+    fastest = math.pi / scan * (1 - 1e-9)
+    first = law.feedback.num[0] / law.feedback.den[0]
+    return Responses(first, law.kick(), float(abs(law.response(fastest))))
+
+
+def ramp_of(a: Algorithm) -> Ramp:
+    """Return what a step of the measurement comes to: the first two moments (specs/equations.md, section 2)."""
+    slope, jump, _ = Law(a).moments()
+    return Ramp(jump, slope)
+
+
+def _beyond_the_corner(law: Law) -> float:
+    """Return the largest gain above the corner of the fastest filter; 0 where there is none."""
+    a = law.algorithm
+    times = [
+        a.Tf if a.has_signal_filter or a.has_term_filter else 0.0,
+        *(f.time for f in (a.pv_filter, a.e_filter) if f is not None),
+    ]
+    fastest = min((t for t in times if t), default=0.0)
+    return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0
+
+
+def _at_once(r: Rational) -> float:
+    num, den = _trimmed(r.num), _trimmed(r.den)
+    if len(num) > len(den):
+        return math.copysign(math.inf, num[-1])
+    return num[-1] / den[-1] if len(num) == len(den) else 0.0
+
+
+def _trimmed(coefficients: tuple[float, ...]) -> list[float]:
+    found = list(coefficients)
+    while len(found) > 1 and found[-1] == 0:
+        found.pop()
+    return found

@@ -1,0 +1,56 @@
+"""How a loop of a fleet ended: its status, whether it settled, whether it is stable, and its margins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from pidemu.fleet.blocks import Outcome
+from pidemu.loop.outcome import has_settled, stability_of
+
+Status = Literal["done", "unstable", "ran away", "failed", "not run"]
+RAN: Final[tuple[Status, ...]] = ("done", "unstable", "ran away")
+"""What the status of a loop that ran may be."""
+MARGINS: Final = {"gain_margin": "", "phase_margin": "deg", "Ms": ""}
+"""Figures of the sampled loop within its limits, with units."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """How a loop ended.
+
+    Attributes
+    ----------
+    status : {"done", "unstable", "ran away"}
+        ``"unstable"``: the sampled loop is, within its limits; ``"ran away"``: the measurement outgrew all numbers.
+    settled : bool
+        Whether the measurement had settled at the end of the run (`pidemu.loop.outcome.has_settled`).
+    stable : bool or None
+        Whether the loop is stable; ``None`` where that was not computed.
+    margins : mapping of str to float
+        What `MARGINS` names; nothing where there are none.
+    """
+
+    status: Status
+    settled: bool
+    stable: bool | None
+    margins: Mapping[str, float]
+
+
+def judgement(found: Outcome, lane: int) -> Judgement:
+    """Return how a loop of a block ended.
+
+    Parameters
+    ----------
+    found : Outcome
+        What came of the block.
+    lane : int
+        The loop's number in it.
+    """
+    member = found.members[lane]
+    m = member.margins
+    stable = stability_of(member.trial, m)
+    status: Status = "ran away" if member.place in found.ran_away else "unstable" if stable is False else "done"
+    settled = has_settled(float(found.columns["swing"][lane]), float(found.columns["peak"][lane]))
+    return Judgement(status, settled, stable, {} if m is None else {name: getattr(m, name) for name in MARGINS})

@@ -1,0 +1,51 @@
+"""Text of cards in comments."""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+
+import pytest
+
+from pidemu.targets.comments import comment_text, python_comments
+
+HOSTILE = (
+    "*/",
+    "/*",
+    "*/*",
+    "/*/",
+    "**//",
+    "(*",
+    "*)",
+    "(*)",
+    "??/",
+    "a\nb",
+    "a\rb",
+    "a\u2028b",
+    "a\x00b",
+    "a\u202eb",
+    '"""',
+    "\\",
+)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_ends_a_comment_or_begins_one_in_any_language(text: str) -> None:
+    found = comment_text(text)
+    assert [mark for mark in ("*/", "/*", "(*", "*)", "??/") if mark in found] == []
+    assert found.isprintable()
+    assert len(found.splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, "coding: latin-1", "xcoding=nonsense"])
+def test_python_reads_nothing_but_comments_and_no_encoding(text: str) -> None:
+    """PEP 263: a comment such as ``coding: latin-1`` in the first two lines declares the encoding."""
+    module = "\n".join(python_comments(text, [text, text]))
+    assert tokenize.detect_encoding(io.BytesIO(module.encode()).readline)[0] == "utf-8"
+    assert ast.parse(module.encode()).body == []
+    assert len(module.splitlines()) == 4
+
+
+def test_ordinary_text_stays_as_it_is() -> None:
+    assert comment_text("filter time 2·Tf [s], 3 °C * 4 / 5, (see p. 7)") == "filter time 2·Tf [s], 3 °C * 4 / 5, (see p. 7)"
