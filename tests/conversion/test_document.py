@@ -35,7 +35,9 @@ CONVERSIONS: dict[str, tuple[str, ...]] = {
     "infinite figures": ("generic/standard", "K=2", "Ti=inf", "Td=1", "--to", "emerson/deltav"),
     "nearest settings": ("generic/standard", "K=2", "Ti=10", "Td=4", "--to", "fisher/provox", "--allow-approximate"),
     "assumed": ("honeywell/tdc3000", "K=2", "T1=1", "T2=0.1", "--to", "emerson/deltav", "--assume"),
-    "ranges": ("generic/standard", "K=2", "Ti=10", "--pv-range", "0,100 bar", "--to", "generic/series", "--to-pv-range", "0,200 bar"),
+    "ranges": (
+        "generic/standard", "K=2", "Ti=10", "--pv-range", "0,100 bar", "--to", "generic/series", "--to-pv-range", "0,200 bar",
+    ),
     "executed at another interval": (
         "generic/standard", "K=2", "Ti=10", "--to", "emerson/deltav", "--scan", "0.2", "--runs-every", "0.1",
     ),
