@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -63,11 +64,17 @@ def target_rows(c: Conversion) -> list[Row]:
     """Return the target's dials in use, with what the textbook rule gives."""
     book = c.textbook.settings
     rows = ((n, v, book[n] if book is not None and n in book else None) for n, v in c.settings.items() if v.active)
-    return [_row(n, v, "-" if rule is None or not rule.active else number(rule.value)) for n, v, rule in rows]
+    return [_row(n, v, "-" if rule is None or not rule.active else _value(rule)) for n, v, rule in rows]
 
 
 def _row(name: str, v: Value, note: str) -> Row:
-    return Row(name, number(v.value), unit_of(v), other_units(v), note, v)
+    value = _value(v)
+    return Row(name, value, unit_of(v), "" if value == "off" else other_units(v), note, v)
+
+
+def _value(v: Value) -> str:
+    """Return a dial's number; nobody can type the infinity at which a card delivers a dial that is off."""
+    return "off" if v.off and math.isinf(v.value) and not v.given else number(v.value)
 
 
 def side_title(s: Settings) -> str:
