@@ -14,10 +14,12 @@ if TYPE_CHECKING:
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import convert
+    from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
     from pidemu.conversion.verify import Verification, verify
     from pidemu.emulator import Controller
     from pidemu.errors import (
+        ActionError,
         CardError,
         CertificateError,
         ConversionRefusedError,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
         FleetError,
         PidemuError,
         ProcessError,
+        QuestionError,
         RecordError,
         ScanError,
         SettingError,
@@ -55,9 +58,12 @@ _HOMES = {
     "convert": "conversion.convert",
     "Verification": "conversion.verify",
     "verify": "conversion.verify",
+    "Answer": "conversion.questions",
+    "Question": "conversion.questions",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",
     "Controller": "emulator",
+    "ActionError": "errors",
     "CardError": "errors",
     "CertificateError": "errors",
     "ConversionRefusedError": "errors",
@@ -65,6 +71,7 @@ _HOMES = {
     "FleetError": "errors",
     "PidemuError": "errors",
     "ProcessError": "errors",
+    "QuestionError": "errors",
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",
@@ -87,6 +94,8 @@ _HOMES = {
 }
 
 __all__ = [
+    "ActionError",
+    "Answer",
     "Card",
     "CardError",
     "CertificateError",
@@ -106,6 +115,8 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "Question",
+    "QuestionError",
     "Reading",
     "Record",
     "RecordError",

@@ -152,7 +152,7 @@ def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
         "options": {"FORM": "Standard"}, "given": {"ALPHA": 0.2}, "scan": (0.2, 0.5), "runs_every": (0.02, 0.5), "mode": "auto",
         "action": "direct", "to_pv_range": "0,200 degC", "to_op_range": "0,50 V = 0,100 %", "match": "low-frequency",
         "process": Process.from_lags(0.8, lags=[20.0], delay=3), "compensate": True, "digits": 4, "allow_approximate": True,
-        "assume": True, "tag": "TIC-101", "bias": 40.0,
+        "assume": True, "tag": "TIC-101", "bias": 40.0, "limits": (5.0, 95.0),
     }  # fmt: skip
     request = pidemu.convert(source, "emerson/deltav", emulate=False, **asked).to_dict()["request"]
     assert request == {
@@ -160,6 +160,6 @@ def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
             "card": "generic/standard", "settings": {"K": 2.0, "Ti": "0.5 min"}, "options": {}, "pv_range": "0,100 degC",
             "op_range": "0,50 V = 0,100 %", "lag_on_pv": 0.0,
         },
-        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5],
+        "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5], "limits": [5.0, 95.0],
         "process": "gain=0.8,lag=20,delay=3",
     }  # fmt: skip

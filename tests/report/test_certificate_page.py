@@ -33,6 +33,7 @@ from pidemu.loop.process import Process, parse_process
 from pidemu.loop.text import written
 from pidemu.report.certificate import certificate_page, write_page
 from pidemu.report.curves import bode, closed_loops, responses
+from pidemu.unverified import facts, unverified_law, unverified_program
 from tests.cli.helpers import said, strict_json, told
 from tests.conversion.support import continuous, outputs
 from tests.helpers import made_up_card
@@ -107,7 +108,7 @@ def below(text: str, title: str) -> ElementTree.Element:
     return found
 
 
-def facts(element: ElementTree.Element) -> dict[str, str]:
+def listed(element: ElementTree.Element) -> dict[str, str]:
     """Return a list of names with what they are."""
     return {words(name): words(text) for name, text in zip(element.iter("dt"), element.iter("dd"), strict=True)}
 
@@ -217,7 +218,7 @@ def test_another_unit_and_a_default_are_said() -> None:
 def test_the_dials_are_printed_as_they_were_found() -> None:
     """On the night of the cut-over they are the way back: what was typed, the options, what the action was set to, the ranges."""
     assert ["T2", "0.1", "min", "= 6 s", "found as 6 s"] in table(page("asked"), "source")
-    found = facts(below(page("asked"), "Before, as found (the way back)"))
+    found = listed(below(page("asked"), "Before, as found (the way back)"))
     assert found == {
         "options": "FORM=interactive (not stated), CTEQN=A (not stated)",
         "action": "direct acting, PV - SP: CTLACTN DIRECT",
@@ -241,12 +242,12 @@ def test_without_a_date_it_is_todays() -> None:
 
 
 def test_what_was_given_and_what_was_chosen_is_on_the_page() -> None:
-    found = facts(below(page("asked"), "Given and chosen"))
+    found = listed(below(page("asked"), "Given and chosen"))
     assert found["given, before"] == "K=2, T1=1, T2=6 s; not given, so as the card delivers them: FORM=interactive, CTEQN=A"
     assert found["given, after"] == "nothing but the card"
     assert (found["mode"], found["action"]) == ("automatic: the operator sets the setpoint", "direct, as stated")
-    assert facts(below(page("exact"), "Given and chosen"))["mode"] == "automatic and cascade, as nothing was stated"
-    assert facts(below(page("at scans"), "Given and chosen"))["chosen"] == "chosen automatically: FORM=Series"
+    assert listed(below(page("exact"), "Given and chosen"))["mode"] == "automatic and cascade, as nothing was stated"
+    assert listed(below(page("at scans"), "Given and chosen"))["chosen"] == "chosen automatically: FORM=Series"
 
 
 def test_the_page_has_the_order_and_the_words_of_the_terminal() -> None:
@@ -349,9 +350,9 @@ def test_every_assumed_field_of_both_cards_is_a_condition_or_in_the_small_print(
     for s in (c.source, c.settings):
         named = {(x.card, x.path) for x in c.conditions}
         conditions = {x.key for x in s.variant.statements() if (s.card.id, x.path) in named}
-        for x in s.assumptions():
-            start = f"{s.card.id}: {x.path} = {x.value}, assumed"
-            assert x.key in conditions or any(line.startswith(" ".join(start.split())) for line in shown)
+        for x in (*unverified_law(s), *unverified_program(s, scan=c.scan is not None)):
+            [fact] = facts([x])
+            assert x.key in conditions or " ".join(f"{s.card.id}: {fact}".split()) in shown
 
 
 def test_what_was_not_given_is_not_covered() -> None:

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pidemu.action import action_line, action_words, carried_action
 from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
@@ -24,8 +26,10 @@ from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.plain import json_safe
+from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
+from pidemu.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof
@@ -169,9 +173,18 @@ class Conversion:
             lines.append(
                 f"Bias: set the output at SP = PV to {number(self.request.bias)} %, by the manual reset or bias of the new block."
             )
+        if self.request.limits is not None:
+            lines.append(f"Output limits: {self._limits(self.request.limits)}.")
         check = self.bench_check
         lines.append(f"No bench check: {check}." if isinstance(check, ScanError) else f"Bench check: {check.text}")
         return tuple(lines)
+
+    def _limits(self, limits: tuple[float, float]) -> str:
+        """Return what the source's output limits are on the target, in words."""
+        old, new = (Scale(s) for s in (self.source, self.settings))
+        low, high = (number(new.output_own(float(old.output_percent(np.array(x))))) for x in limits)
+        unit = "%" if self.settings.equation.signals == "percent" else self.settings.own_ranges[1].unit or "output units"
+        return f"set {low} to {high} {unit}"
 
     @cached_property
     def command(self) -> str:
@@ -233,10 +246,11 @@ class Conversion:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What the result rests on without anybody having said so; what makes the law first."""
-        found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
-        law = [text for a, text in found if a.makes_the_law]
-        return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
+        """Every fact of the two cards that is assumed or inferred and at work at these settings; what makes the law first."""
+        both = (self.source, self.settings)
+        law = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_law(s))]
+        program = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_program(s, scan=self.scan is not None))]
+        return tuple(dict.fromkeys(law + program))
 
     def to_dict(self, date: datetime.date | None = None) -> dict[str, Any]:
         """Return everything as plain values, the form of ``pidemu convert --json`` (specs/conversion.schema.json).

@@ -25,7 +25,7 @@ Name = Annotated[str, Field(max_length=200)]
 Line = Annotated[str, Field(max_length=2000)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
-Intervals = Annotated[list[float], Field(min_length=2, max_length=2)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 _CERTIFICATE: Final = "Certificate"
 _LINES: Final = {"type": "array", "items": {"type": "string"}}
 
@@ -99,8 +99,8 @@ class Asked(Part):
     to: Name = Field(description="The target's card.")
     options: dict[Name, Line] = Field(description="Options of the target that were stated.")
     given: dict[Name, Line | float] = Field(description="Dials of the target that were given.")
-    scan: Intervals | None = Field(description="Intervals that source and target compute with [s].")
-    runs_every: Intervals | None = Field(description="Intervals at which they are really executed, where these are others [s].")
+    scan: Pair | None = Field(description="Intervals that source and target compute with [s].")
+    runs_every: Pair | None = Field(description="Intervals at which they are really executed, where these are others [s].")
     mode: Literal["auto", "cascade", "both"]
     action: Literal["reverse", "direct"] | None
     to_pv_range: Line | None = Field(description="Measurement range of the target, where it is not the source's.")
@@ -110,6 +110,7 @@ class Asked(Part):
     compensate: bool
     digits: int | None
     bias: float | None = Field(description="Output at SP = PV of a loop without integral action [%].")
+    limits: Pair | None = Field(description="Output limits of the source [%, or the units that its card computes in].")
     allow_approximate: bool
     assume: bool
     tag: Line
@@ -223,7 +224,7 @@ class ConversionPart(Part):
     ranking: list[Ranked]
     certificate: Any
     textbook: TextbookPart
-    scan: Intervals | None = Field(description="Intervals at which source and target are executed [s].")
+    scan: Pair | None = Field(description="Intervals at which source and target are executed [s].")
     gain_factor: float = Field(description="What the source's gain was multiplied by for new ranges; negative: the action turns.")
     process: str | None
     setpoint_filter: FilterPart | None

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from pidemu.card.load import Statement
 from pidemu.certificate.figures import emulation_line, kick_line, number, other_units, textbook_line, unit_of
 from pidemu.conversion.conditions import Condition
 from pidemu.settings import Settings, Value
+from pidemu.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -142,17 +142,12 @@ def bump_line(plan: TransferPlan) -> str:
 
 
 def unverified(c: Conversion) -> list[str]:
-    """Return what else of the two cards is only assumed, or of their laws inferred, beside the conditions of the verdict."""
+    """Return what else of the two cards is assumed or inferred and at work at these settings, beside the conditions."""
     named = {(x.card, x.path) for x in c.conditions}
     found: list[str] = []
     for s in (c.source, c.settings):
         keys = {x.key for x in s.variant.statements() if (s.card.id, x.path) in named}
-        statements = [*s.assumptions(), *s.inferences()]
-        found += [f"{s.card.id}: {_statement(x)}" for x in statements if x.key not in keys]
+        program = unverified_program(s, scan=c.scan is not None, limits=c.request.limits is not None)
+        statements = [*unverified_law(s, rules=True, action=True), *program]
+        found += [f"{s.card.id}: {fact}" for fact in facts(x for x in statements if x.key not in keys)]
     return list(dict.fromkeys(found))
-
-
-def _statement(x: Statement) -> str:
-    evidence = x.evidence
-    assert evidence is not None  # it is assumed or inferred
-    return f"{x.path} = {x.value}, {evidence.status.value}" + (f": {evidence.note}" if evidence.note else "")
