@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from pidemu.conversion.convert import convert
     from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
+    from pidemu.conversion.verify import Verification, verify
     from pidemu.emulator import Controller
     from pidemu.errors import (
         ActionError,
         CardError,
+        CertificateError,
         ConversionRefusedError,
         EngineError,
         FleetError,
@@ -54,6 +56,8 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "Verification": "conversion.verify",
+    "verify": "conversion.verify",
     "Answer": "conversion.questions",
     "Question": "conversion.questions",
     "Reading": "ambiguity.readings",
@@ -61,6 +65,7 @@ _HOMES = {
     "Controller": "emulator",
     "ActionError": "errors",
     "CardError": "errors",
+    "CertificateError": "errors",
     "ConversionRefusedError": "errors",
     "EngineError": "errors",
     "FleetError": "errors",
@@ -93,6 +98,7 @@ __all__ = [
     "Answer",
     "Card",
     "CardError",
+    "CertificateError",
     "Comparison",
     "Controller",
     "Conversion",
@@ -119,6 +125,7 @@ __all__ = [
     "Settings",
     "Simulation",
     "UnitError",
+    "Verification",
     "__version__",
     "cards",
     "compare",
@@ -129,6 +136,7 @@ __all__ = [
     "read_record",
     "readings",
     "simulate",
+    "verify",
 ]
 
 

@@ -231,6 +231,11 @@ class Card:
         return hash(self.id)
 
     @property
+    def digest(self) -> str:
+        """The card's version: SHA-256 of its file, in hexadecimal."""
+        return self.document.digest
+
+    @property
     def title(self) -> str:
         """Vendor, product and algorithm in one line."""
         return f"{self.data.vendor} {self.data.product}: {self.data.algorithm}"

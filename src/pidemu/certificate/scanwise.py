@@ -106,11 +106,13 @@ def emulated(
     Raises
     ------
     ScanError
-        A controller cannot be run at its interval.
+        A controller cannot be run at its interval, or scans so slowly that it would not scan once.
     """
     record = record_for(source, scans[0])
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
+    if not theirs_at.size:
+        raise ScanError(f"a scan interval of {scans[1]:g} s is longer than the whole record, {mine_at[-1]:.6g} s")
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
     actions = acting_alike(target, factor)
     mine, theirs = (_Bench(s, h, action, in_cascade) for s, h, action in zip((source, target), scans, actions, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,6 +105,13 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Action of the loop. Reverse: the output falls when the measurement rises (error SP - PV). Needed where a cut-over "
     "depends on it; where the sign of the gain is the action it is known.",
 )
+@click.option(
+    "--date",
+    type=click.DateTime(["%Y-%m-%d"]),
+    callback=lambda _ctx, _option, moment: moment and moment.date(),
+    metavar="YYYY-MM-DD",
+    help="Date of the certificate; by default today.",
+)
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
@@ -133,6 +141,7 @@ def command(
     to_op_range: SignalRange | None,
     now: str | None,
     action: str | None,
+    date: datetime.date | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -188,9 +197,9 @@ def command(
     if page is not None:
         from pidemu.report.certificate import write_page
 
-        write_page(page, conversion, plan)
+        write_page(page, conversion, plan, date=date)
     if as_json:
-        print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
+        print_json({**conversion.to_dict(date), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
     else:
         _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from pidemu.cli.common import number, print_json
+from pidemu.conversion.document import question_document
 from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
@@ -16,7 +17,7 @@ def print_questions(error: QuestionError, source: Settings | None, goal: str, as
     """Print what has to be answered first: on stderr, with ``--json`` on stdout."""
     if as_json:
         known = {} if source is None else {"from": source.to_dict(), "to": {"card": goal}}
-        print_json({**known, "verdict": "question", "questions": [q.to_dict() for q in error.questions]})
+        print_json(question_document(error, known))
         click.echo(f"question: {error}", err=True)
         return
     for question in error.questions:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
+from pidemu.conversion.document import provenance
 from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
@@ -31,6 +33,7 @@ from pidemu.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof
+    from pidemu.cutover.bench_check import BenchCheck
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
@@ -153,10 +156,18 @@ class Conversion:
         return f"{number(self.settings.lag)} s" if self.settings.lag else ""
 
     @cached_property
-    def at_the_loop(self) -> tuple[str, ...]:
-        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+    def bench_check(self) -> BenchCheck | ScanError:
+        """A check of the dials at the controller before the cut-over; the error where the target cannot be run for one."""
         from pidemu.cutover.bench_check import bench_check
 
+        try:
+            return bench_check(self.settings, self.scan[1] if self.scan else None, self.action)
+        except ScanError as error:
+            return error
+
+    @property
+    def at_the_loop(self) -> tuple[str, ...]:
+        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
         lines = [f"Action: {self.action_text}." + self._old_action()]
         if self.request.bias is not None and not self.settings.algorithm().ki:
             lines.append(
@@ -164,10 +175,8 @@ class Conversion:
             )
         if self.request.limits is not None:
             lines.append(f"Output limits: {self._limits(self.request.limits)}.")
-        try:
-            lines.append(f"Bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
-        except ScanError as error:
-            lines.append(f"No bench check: {error}.")
+        check = self.bench_check
+        lines.append(f"No bench check: {check}." if isinstance(check, ScanError) else f"Bench check: {check.text}")
         return tuple(lines)
 
     def _limits(self, limits: tuple[float, float]) -> str:
@@ -243,14 +252,23 @@ class Conversion:
         program = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_program(s, scan=self.scan is not None))]
         return tuple(dict.fromkeys(law + program))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, the form of ``pidemu convert --json``."""
+    def to_dict(self, date: datetime.date | None = None) -> dict[str, Any]:
+        """Return everything as plain values, the form of ``pidemu convert --json`` (specs/conversion.schema.json).
+
+        Parameters
+        ----------
+        date : datetime.date, optional
+            Date of the certificate; by default today.
+        """
+        check = self.bench_check
         plain = {
+            **provenance(self, date),
             "from": self.source.to_dict(),
             "to": self._target_dict(),
             "match": self.match,
             "verdict": self.verdict,
             "verdicts": self.verdicts,
+            "refusal": self.refusal,
             "sentence": self.sentence,
             "conditions": [c.to_dict() for c in self.conditions],
             "chosen": dict(self.chosen),
@@ -270,6 +288,8 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
+            "action": {"action": self.action, "text": self.action_text},
+            "bench_check": None if isinstance(check, ScanError) else asdict(check),
             "at_the_loop": list(self.at_the_loop),
             "command": self.command,
         }
