@@ -6,7 +6,6 @@ import ast
 import math
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,8 +14,8 @@ import pidemu
 from pidemu.card.load import Card
 from pidemu.certificate.linear import bands, deviation
 from pidemu.settings import Settings
+from tests.readme import ROOT, statements
 
-ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "conversion.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 SPEC = (ROOT / "specs" / "equations.md").read_text(encoding="utf-8")
@@ -25,18 +24,6 @@ TABLE = re.compile(r"^<!-- recomputed: (\w+) -->\n((?:\|.*\n)+)", re.MULTILINE)
 NUMBER = re.compile(r"(?<![\w.^])\d+(?:\.\d+)?(?:e-?\d+)?(?!\w|\.\d)")
 DIGITS = {float(i) for i in range(10)}
 """Bare digits are words of formulas: orders, squares, sections."""
-
-
-def statements(block: str) -> list[tuple[str, str, bool]]:
-    """Return each statement of a block, what its comment says it gives, and whether it is an expression."""
-    lines = block.splitlines()
-    found = []
-    for node in ast.parse(block).body:
-        assert node.end_lineno is not None
-        code = "\n".join(lines[node.lineno - 1 : node.end_lineno])
-        comment = lines[node.end_lineno - 1].partition("  # ")[2]
-        found.append((code, comment, isinstance(node, ast.Expr)))
-    return found
 
 
 def test_the_code_of_the_page_gives_what_its_comments_say() -> None:
