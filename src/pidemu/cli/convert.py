@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
-from pidemu.cli.common import Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.common import Pair, Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
@@ -89,6 +89,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
 )
 @click.option("--bias", type=float, help="Output at SP = PV of a loop without integral action [%].")
+@click.option("--limits", type=Pair(), help="Output limits that the source is set to: the answer states those of the target.")
 @click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
 @click.option("--pv-range", type=Range(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
 @click.option("--op-range", type=Range(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
@@ -124,6 +125,7 @@ def command(
     allow_approximate: bool,
     digits: int,
     bias: float | None,
+    limits: tuple[float, float] | None,
     tag: str,
     pv_range: SignalRange | None,
     op_range: SignalRange | None,
@@ -169,7 +171,7 @@ def command(
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "runs_every": runs_every, "compensate": compensate, "mode": mode,
         "action": action, "match": match, "digits": digits, **to_ranges,
-        "bias": bias, "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
+        "bias": bias, "limits": limits, "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
     }  # fmt: skip
     if loop is not None:
         arguments |= {name: value for name, value in loop.others.items() if not _was_given(name)}

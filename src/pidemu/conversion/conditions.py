@@ -173,7 +173,7 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
 
 
 def _bump_test(s: Settings, other: Form) -> str:
-    """Return the test on the old controller that tells two forms apart: what a step of the measurement leaves without the integral."""
+    """Return the test on the old controller that tells two forms apart: what a PV step leaves beside the integral."""
     varied = replace(s, variant=replace(s.variant, equation=s.equation.model_copy(update={"form": other})))
     jumps = [_short(abs(x.law().moments()[1])) for x in (s, varied)]
     return (

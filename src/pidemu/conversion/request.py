@@ -46,6 +46,8 @@ class Request:
         Digits to round to.
     bias : float or None
         Output at SP = PV of a loop without integral action [% of the output span], where it was stated.
+    limits : tuple of float or None
+        Output limits of the source, where they were stated [%, or the units that its card computes in].
     compensate, allow_approximate, assume : bool
         As in `convert`.
     """
@@ -62,6 +64,7 @@ class Request:
     process: Process | None = None
     digits: int | None = None
     bias: float | None = None
+    limits: tuple[float, float] | None = None
     compensate: bool = False
     allow_approximate: bool = False
     assume: bool = False
@@ -95,6 +98,8 @@ class Request:
             yield from ("--digits", str(self.digits))
         if self.bias is not None:
             yield from ("--bias", exactly(self.bias))
+        if self.limits is not None:
+            yield f"--limits={','.join(map(exactly, self.limits))}"
         if self.tag:
             yield from ("--tag", self.tag)
         flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
@@ -124,6 +129,7 @@ def read_request(
     process: Process | None,
     digits: object,
     bias: float | None,
+    limits: tuple[float, float] | None,
     compensate: bool,
     allow_approximate: bool,
     assume: bool,
@@ -163,6 +169,7 @@ def read_request(
         process=process,
         digits=checked_digits(digits),
         bias=bias,
+        limits=limits,
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,

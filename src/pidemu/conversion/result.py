@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pidemu.action import action_line, action_words, carried_action
 from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
@@ -22,6 +24,7 @@ from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.plain import json_safe
+from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
 from pidemu.unverified import facts, unverified_law, unverified_program
@@ -159,11 +162,20 @@ class Conversion:
             lines.append(
                 f"Bias: set the output at SP = PV to {number(self.request.bias)} %, by the manual reset or bias of the new block."
             )
+        if self.request.limits is not None:
+            lines.append(f"Output limits: {self._limits(self.request.limits)}.")
         try:
             lines.append(f"Bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
         except ScanError as error:
             lines.append(f"No bench check: {error}.")
         return tuple(lines)
+
+    def _limits(self, limits: tuple[float, float]) -> str:
+        """Return what the source's output limits are on the target, in words."""
+        old, new = (Scale(s) for s in (self.source, self.settings))
+        low, high = (number(new.output_own(float(old.output_percent(np.array(x))))) for x in limits)
+        unit = "%" if self.settings.equation.signals == "percent" else self.settings.own_ranges[1].unit or "output units"
+        return f"set {low} to {high} {unit}"
 
     @cached_property
     def command(self) -> str:
