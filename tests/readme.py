@@ -5,7 +5,7 @@ certificate, for which a Chromium is needed.
 
 A comment in a page, in the line before a block, says more about it:
 
-- ``<!-- shown: To until RATE; Verdict -->``: only parts of what the command prints are shown, ``[...]`` where something was left out.
+- ``<!-- shown: To until RATE; Verdict -->``: parts of what the command prints are shown, ``[...]`` for what was left out.
   A part goes from the first line that begins with its first word or words until before the next one that begins with the second,
   or until an empty line;
 - ``<!-- file: loops.csv -->``: the commands and the code of the page find the block in a file of that name;
@@ -39,7 +39,8 @@ PICTURED = "convert fisher/provox GAIN=2 RESET=4 RATE=0.1 --to emerson/deltav"
 """The conversion of the README, whose certificate is pictured."""
 CUT = "[...]"
 CONSOLE = re.compile(
-    r"^(?P<head>(?:<!-- shown: (?P<parts>.*) -->\n)?```console\n\$ pidemu (?P<command>.*)\n)(?P<printed>(?:.*\n)*?)```$", re.MULTILINE
+    r"^(?P<head>(?:<!-- shown: (?P<parts>.*) -->\n)?```console\n\$ pidemu (?P<command>.*)\n)(?P<printed>(?:.*\n)*?)```$",
+    re.MULTILINE,
 )
 _PYTHON = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"^<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -141,13 +142,15 @@ def statements(block: str) -> list[tuple[str, str, bool]]:
 
 
 def run(block: str, names: dict[str, Any]) -> int:
-    """Run a block of code and hold what its comments say against it; return how many there are."""
+    """Run a block of code and hold the value of each expression against its comment; return how many there are.
+
+    The comment behind any other statement is prose.
+    """
     checked = 0
     for code, expected, is_expression in statements(block):
-        if not expected:
+        if not (is_expression and expected):
             exec(code, names)
             continue
-        assert is_expression, code
         assert eval(code.partition("  # ")[0], names) == ast.literal_eval(expected), code
         checked += 1
     return checked

@@ -15,14 +15,18 @@ SOURCE = ROOT / "src" / "pidemu"
 (_LIST,) = re.findall(r"^```text\n(.*?)^```$", TEXT, re.DOTALL | re.MULTILINE)
 ORDER = re.findall(r"\w+", _LIST)
 """The modules and packages, each above what it depends on."""
-ROOMS = sorted({path.stem for path in SOURCE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()} - {"__init__", "__main__"})
+ROOMS = sorted(
+    {path.stem for path in SOURCE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()} - {"__init__", "__main__"}
+)
 
 
 def imported(room: str) -> set[str]:
     """Return the modules and packages that one imports when it is imported, without those inside functions."""
     folder = SOURCE / room
     files = sorted(folder.rglob("*.py")) if folder.is_dir() else [SOURCE / f"{room}.py"]
-    nodes = [node for file in files for node in ast.parse(file.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)]
+    nodes = [
+        node for file in files for node in ast.parse(file.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)
+    ]
     inside = {(node.module or "").split(".")[1] for node in nodes if (node.module or "").startswith("pidemu.")}
     inside |= {alias.name for node in nodes if node.module == "pidemu" for alias in node.names}
     return inside & set(ROOMS) - {room}

@@ -34,3 +34,8 @@ def test_the_picture_is_that_of_a_conversion_that_the_readme_shows() -> None:
     width, height = (int.from_bytes(data[at : at + 4]) for at in (16, 20))
     assert width == 1000
     assert 500 < height < 2000
+
+
+def test_seven_cards_are_verified_against_the_real_implementation() -> None:
+    assert "seven cards against the real implementation" in TEXT
+    assert read(ROOT / "docs" / "emulation.md").count("| against the real implementation |") == 7
