@@ -193,6 +193,9 @@ def take_picture(width: int = 1000, highest: int = 3000) -> None:
 
 def main() -> None:
     """Renew all pages and, where asked for, the picture."""
+    from tests.test_docs_conversion import write_tables  # it imports this module
+
+    write_tables()
     for page in PAGES:
         renew(page)
     if "--picture" in sys.argv[1:]:

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pidemu.report.command import command_for
 
 import pidemu
 from pidemu.card.library import ENVIRONMENT
@@ -28,7 +29,6 @@ from pidemu.errors import PidemuError
 from pidemu.loop.process import Process, parse_process
 from pidemu.loop.text import written
 from pidemu.report.certificate import certificate_page, write_page
-from pidemu.report.command import command_for
 from pidemu.report.curves import bode, closed_loops, responses
 from tests.cli.helpers import said, strict_json, told
 from tests.conversion.support import continuous, outputs

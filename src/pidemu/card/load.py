@@ -120,7 +120,7 @@ class Statement:
 
     @property
     def is_assumed(self) -> bool:
-        """Whether nobody says so."""
+        """Whether no source says so."""
         return self.evidence is not None and self.evidence.status is Status.ASSUMED
 
     @property
@@ -194,7 +194,7 @@ class Variant:
         Parameters
         ----------
         defaulted : iterable of str, optional
-            Options that nobody chose, so that their assumed defaults count as well; by default all.
+            Options that were not stated, so that their assumed defaults count as well; by default all.
         """
         seen: dict[str, Statement] = {}
         for name in self.chosen if defaulted is None else defaulted:

@@ -164,7 +164,7 @@ def parse(text: str, path: str) -> Document:
     Raises
     ------
     CardError
-        The text is no YAML, is empty, or uses what cards do not: every problem found, with its place.
+        The text is not YAML, is empty, or uses what cards do not: every problem found, with its place.
     """
     document = Document(path, tuple(text.splitlines()))
     reader = _Reader(document)

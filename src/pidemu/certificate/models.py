@@ -117,7 +117,7 @@ class ScanByScan:
     scan : tuple of float
         Scan intervals of source and target [s].
     taken : bool
-        Whether nobody gave these intervals, so that one was taken for both.
+        Whether no interval was given, so that one was taken for both.
     largest : float
         Largest difference of the two outputs [% of the output span].
     largest_at : float

@@ -36,7 +36,7 @@ _TRIES: Final = 6
 
 
 def common_interval(source: Settings, target: Settings) -> float:
-    """Return a scan interval for both controllers where nobody gave any [s].
+    """Return a scan interval for both controllers where none was given [s].
 
     It is the source card's, made to suit the settings: between a 200th and a 20th of the effective integral time, and short enough
     for the filters of both. Where a dial counts in scans it is the interval at which that was read.
@@ -99,7 +99,7 @@ def emulated(
     factor : float
         What the source's gain is multiplied by for new signal ranges; negative where the action changes.
     taken : bool
-        Whether nobody gave these intervals.
+        Whether these intervals were taken, as none was given.
     in_cascade : bool
         Whether the setpoint is a remote one.
 

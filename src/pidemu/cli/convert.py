@@ -48,7 +48,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     "--from",
     "word",
     metavar="WORD",
-    help="Instead of CARD, where it is not sure what the numbers mean: every reading is shown, none is chosen.",
+    help="Instead of CARD, where it is uncertain what the numbers mean: every reading is shown, none is chosen.",
 )
 @click.option("--loop", "loop_file", metavar="FILE.yaml", help="Read source, settings and target from a file instead.")
 @click.option(

@@ -320,7 +320,7 @@ def _paced(source: Settings, request: Request) -> Settings:
 
 
 def _chosen(settings: Settings, request: Request) -> dict[str, str]:
-    """Return the options of the target that nobody stated and that are not as the card delivers them."""
+    """Return the options of the target that were not stated and are not as the card delivers them."""
     stated = {name.casefold() for name in request.options}
     delivered = settings.card.variant({}).chosen
     return {n: c for n, c in settings.options.items() if n.casefold() not in stated and c != delivered[n]}
@@ -361,7 +361,7 @@ def _refuse_absurd_gains(source: Settings) -> None:
     a = source.algorithm()
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
+            raise SettingError(f"{source.card.id}: {gain:g} is not a {name} gain that a controller has; check the settings")
 
 
 def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:

@@ -47,5 +47,5 @@ def _explained(a: Attempt, best: Attempt) -> Explained:
     paths = (a.certificate.headline, a.certificate.setpoint_headline)
     off = [percent(p.loop_band.max_deviation) for p in paths]
     dials = ", ".join(f"{n} {number(float(f'{v.value:.4g}'))}" for n, v in a.settings.items() if v.active and v.given)
-    why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good; this one stands behind in the card"
+    why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good, but it comes later in the card"
     return Explained(options, a.verdict, off[0], off[1], dials, why)

@@ -142,7 +142,7 @@ def read_request(
     Raises
     ------
     SettingError
-        A name comes twice, or a range, mode, action or number of digits is none.
+        A name comes twice, or a range, mode, action or number of digits cannot be read.
     ScanError
         A scan interval is not a positive number.
     """
