@@ -98,7 +98,7 @@ def prepare(page: Path, folder: Path) -> None:
 
 def printed_by(command: str) -> str:
     """Run a command without its ``pidemu`` in the current folder and return what it prints on screen."""
-    return CliRunner().invoke(cli, shlex.split(command), prog_name="pidemu").output
+    return CliRunner().invoke(cli, shlex.split(command), prog_name="pidemu", catch_exceptions=False).output
 
 
 def shortened(printed: str, parts: str) -> str:
