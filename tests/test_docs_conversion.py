@@ -31,6 +31,14 @@ def test_every_expression_of_the_page_says_what_it_gives() -> None:
     assert [code for code, comment, is_expression in found if is_expression and not comment] == []
 
 
+def test_choices_that_are_refused_for_one_reason_are_one_line() -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
+    found = explained_choices(pidemu.convert(source, "emerson/deltav", emulate=False))
+    refused = [e for e in found if e.verdict == "refused"]
+    assert len({e.why for e in refused}) == len(refused)
+    assert [e.options for e in refused if "NL_GAP" in e.why] == ["FRSIPID_OPTS=nonlinear gain, and 15 more"]
+
+
 def rules() -> list[list[str]]:
     """Rebuild the table of section 4: textbook rule against low-frequency match."""
     at = [0.1, 0.3, 1, 3, 10]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from pidemu.certificate.figures import number, percent
@@ -35,8 +35,19 @@ class Explained:
 
 
 def explained(c: Conversion) -> tuple[Explained, ...]:
-    """Return every choice of the target's options that was looked at, the best first."""
-    return tuple(_explained(a, c.ranking[0]) for a in c.ranking)
+    """Return every choice of the target's options that was looked at, the best first; refusals for one reason are one."""
+    found = [_explained(a, c.ranking[0]) for a in c.ranking]
+    refused: dict[str, list[Explained]] = {}
+    for choice in found:
+        if choice.verdict == "refused":
+            refused.setdefault(choice.why, []).append(choice)
+    return (*(x for x in found if x.verdict != "refused"), *(_together(same) for same in refused.values()))
+
+
+def _together(same: list[Explained]) -> Explained:
+    """Return choices that are refused for the same reason as one."""
+    more = len(same) - 1
+    return replace(same[0], options=f"{same[0].options}, and {more} more" if more else same[0].options)
 
 
 def _explained(a: Attempt, best: Attempt) -> Explained:
