@@ -1,34 +1,24 @@
-"""Every figure on docs/conversion.md is recomputed: the code is run, the tables are rebuilt, the text holds no other numbers.
-
-``python -m tests.test_docs_conversion`` writes the tables and what the commands print.
-"""
+"""Every figure on docs/conversion.md is recomputed: the tables are rebuilt, the text holds no other numbers."""
 
 from __future__ import annotations
 
-import ast
 import math
 import re
-import shlex
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
 import pidemu
 from pidemu.card.load import Card
 from pidemu.certificate.linear import bands, deviation
-from pidemu.cli import cli
 from pidemu.conversion.explain import explained as explained_choices
 from pidemu.settings import Settings
+from tests.readme import CONSOLE, ROOT, statements
 
-ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "conversion.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 SPEC = (ROOT / "specs" / "equations.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-CONSOLE = re.compile(r"^```console\n\$ pidemu (.*?)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 TABLE = re.compile(r"^<!-- recomputed: (\w+) -->\n((?:\|.*\n)+)", re.MULTILINE)
 HEADING = re.compile(r"^## \d+\.", re.MULTILINE)
 NUMBER = re.compile(r"(?<![\w.^])\d+(?:\.\d+)?(?:e-?\d+)?(?!\w|\.\d)")
@@ -36,30 +26,9 @@ DIGITS = {float(i) for i in range(10)}
 """Bare digits are words of formulas: orders, squares, sections."""
 
 
-def statements(block: str) -> list[tuple[str, str, bool]]:
-    """Return each statement of a block, what its comment says it gives, and whether it is an expression."""
-    lines = block.splitlines()
-    found = []
-    for node in ast.parse(block).body:
-        assert node.end_lineno is not None
-        code = "\n".join(lines[node.lineno - 1 : node.end_lineno])
-        comment = lines[node.end_lineno - 1].partition("  # ")[2]
-        found.append((code, comment, isinstance(node, ast.Expr)))
-    return found
-
-
-def test_the_code_of_the_page_gives_what_its_comments_say() -> None:
-    names: dict[str, Any] = {}
-    checked = 0
-    for block in BLOCK.findall(TEXT):
-        for code, expected, is_expression in statements(block):
-            if not is_expression:
-                exec(code, names)
-                continue
-            assert expected, f"says nothing: {code}"
-            assert eval(code.partition("  # ")[0], names) == ast.literal_eval(expected), code
-            checked += 1
-    assert checked > 60
+def test_every_expression_of_the_page_says_what_it_gives() -> None:
+    found = [statement for block in BLOCK.findall(TEXT) for statement in statements(block)]
+    assert [code for code, comment, is_expression in found if is_expression and not comment] == []
 
 
 def test_choices_that_are_refused_for_one_reason_are_one_line() -> None:
@@ -68,11 +37,6 @@ def test_choices_that_are_refused_for_one_reason_are_one_line() -> None:
     refused = [e for e in found if e.verdict == "refused"]
     assert len({e.why for e in refused}) == len(refused)
     assert [e.options for e in refused if "NL_GAP" in e.why] == ["FRSIPID_OPTS=nonlinear gain, and 15 more"]
-
-
-@pytest.mark.parametrize(("command", "printed"), CONSOLE.findall(TEXT))
-def test_a_command_prints_what_the_page_shows(command: str, printed: str) -> None:
-    assert CliRunner().invoke(cli, shlex.split(command), prog_name="pidemu").output == printed
 
 
 def rules() -> list[list[str]]:
@@ -174,7 +138,7 @@ def test_the_table_of_the_two_rules_is_that_of_the_specification() -> None:
 
 
 def test_every_figure_in_the_text_stands_in_the_code_or_in_a_table_that_is_recomputed() -> None:
-    consoles = [f"{command}\n{printed}" for command, printed in CONSOLE.findall(TEXT)]
+    consoles = [match[0] for match in CONSOLE.finditer(TEXT)]
     shown = "\n".join([*BLOCK.findall(TEXT), *consoles, *(table for _, table in TABLE.findall(TEXT))])
     known = {float(x) for x in NUMBER.findall(shown)} | DIGITS
     text = HEADING.sub("", TABLE.sub("", CONSOLE.sub("", BLOCK.sub("", TEXT))))
@@ -202,25 +166,12 @@ def test_the_formulas_of_the_scan_rules_are_those_of_the_specification_which_are
     assert mine == [[row[i] for i in columns] for row in theirs]
 
 
-@pytest.mark.parametrize("target", re.findall(r"\]\(([^)#]+)\)", TEXT))
-def test_every_link_of_the_page_leads_somewhere(target: str) -> None:
-    assert (PAGE.parent / target).exists()
-
-
-def main() -> None:
-    """Write the tables and what the commands print today into the page."""
+def write_tables() -> None:
+    """Write the tables as they are today into the page."""
 
     def table(match: re.Match[str]) -> str:
         rows = REBUILT[match[1]]()
-        lines = [f"| {' | '.join(row)} |" for row in [rows[0], *rows[1:]]]
+        lines = [f"| {' | '.join(row)} |" for row in rows]
         return "\n".join([f"<!-- recomputed: {match[1]} -->", lines[0], "|" + "---|" * len(rows[0]), *lines[1:], ""])
 
-    def printed(match: re.Match[str]) -> str:
-        output = CliRunner().invoke(cli, shlex.split(match[1]), prog_name="pidemu").output
-        return f"```console\n$ pidemu {match[1]}\n{output}```"
-
-    PAGE.write_text(CONSOLE.sub(printed, TABLE.sub(table, TEXT)), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    PAGE.write_text(TABLE.sub(table, TEXT), encoding="utf-8")
