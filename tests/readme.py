@@ -46,7 +46,24 @@ _PYTHON = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"^<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PART = re.compile(r"^<!-- part of: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
-PREPARE: dict[str, Callable[[Path], None]] = {}
+
+def signed_certificate(folder: Path) -> None:
+    """Put the signed certificate of docs/certificate.md and its corrected card into a folder."""
+    found = re.search(r"^    pidemu (.*) --html .*$", read(ROOT / "docs" / "certificate.md"), re.MULTILINE)
+    assert found is not None
+    (folder / "TIC-101.json").write_text(printed_by(f"{found[1]} --date 2026-07-01 --json"), encoding="utf-8")
+    (folder / "cards" / "fisher").mkdir(parents=True)
+    card = (ROOT / "vendors" / "fisher" / "provox.yaml").read_text(encoding="utf-8")
+    for old, new in (
+        ("ratio: 0.125", "ratio: 0.1"),
+        ("{kp: 5.5, ki: 0.133333, kd: 39.375, Tf: 3.75}", "{kp: 5.6, ki: 0.133333, kd: 43.2, Tf: 3}"),
+    ):
+        assert old in card
+        card = card.replace(old, new)
+    (folder / "cards" / "fisher" / "provox.yaml").write_text(card, encoding="utf-8")
+
+
+PREPARE: dict[str, Callable[[Path], None]] = {"certificate.md": signed_certificate}
 """By page: what else has to be put into the folder in which its commands run."""
 
 
