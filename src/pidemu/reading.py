@@ -80,7 +80,7 @@ def _unknown(card: Card, variant: Variant, name: str) -> str:
 
 
 def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, object], notes: list[str]) -> dict[str, object]:
-    """Choose an option nobody gave where the dials named exist under one of its choices only."""
+    """Choose an option that was not given where the dials named exist under one of its choices only."""
     chosen = dict(options)
     for name, option in card.data.options.items():
         if match_name(name, options):

@@ -88,7 +88,7 @@ WRONG = {
         "no card 'generic/standrd' (did you mean 'generic/standard'?); 'pidemu cards' lists them"
     ),
     "A,generic/standard,K=2; Ti=10; T=3,gain=1,,,,,,": (
-        "generic/standard: unknown setting 'T' (did you mean 'Ti'?); settings: K, Ti, Td, Tf, b, c, INTEGRAL_RULE, DERIVATIVE_RULE"
+        "generic/standard: unknown setting 'T' (did you mean 'Ti'?); settings: K, Ti, Td, Tf, b, c"
     ),
     "A,fisher/provox,,gain=1,,,,,,": (
         "fisher/provox: GAIN: missing; it sets the gain (% output per % PV), in %/%; "
@@ -109,10 +109,10 @@ WRONG = {
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,100,,,": "limits: '100' is not two numbers such as 0,200",
     'A,generic/standard,K=2; Ti=10,gain=1,,,,"1,2,3",,': (
-        "setpoint: '1,2,3' is not a step; write its size in %, such as 5, or when and its size, such as 60,5"
+        "setpoint: '1,2,3' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,,,5 %,": (
-        "load: '5 %' is not a step; write its size in %, such as 5, or when and its size, such as 60,5"
+        "load: '5 %' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,,,,1 %": (
         "time: '1 %' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min"
@@ -124,7 +124,7 @@ WRONG = {
     'A,generic/standard,"K=2': ("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
 }
 
-WRONG["A" * 200_000] = "no row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
+WRONG["A" * 200_000] = "not a row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))

@@ -62,6 +62,7 @@ def convert(
     compensate: bool = False,
     digits: int | None = None,
     bias: float | None = None,
+    limits: tuple[float, float] | None = None,
     allow_approximate: bool = False,
     assume: bool = False,
     emulate: bool = True,
@@ -110,6 +111,8 @@ def convert(
     bias : float, optional
         Output of the old controller at SP = PV [% of the output span], for a loop without integral action; without it the answer
         lists it as open.
+    limits : tuple of float, optional
+        Output limits that the source is set to [%, or the units that its card computes in]: the answer states those of the target.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     assume : bool
@@ -146,7 +149,8 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, limits=limits,
+        compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)
@@ -316,7 +320,7 @@ def _paced(source: Settings, request: Request) -> Settings:
 
 
 def _chosen(settings: Settings, request: Request) -> dict[str, str]:
-    """Return the options of the target that nobody stated and that are not as the card delivers them."""
+    """Return the options of the target that were not stated and are not as the card delivers them."""
     stated = {name.casefold() for name in request.options}
     delivered = settings.card.variant({}).chosen
     return {n: c for n, c in settings.options.items() if n.casefold() not in stated and c != delivered[n]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -13,6 +13,8 @@ from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
+
+Interval = Number | Annotated[list[Number], Field(min_length=1, max_length=2)]
 
 
 class LoopFile(Model):
@@ -28,12 +30,8 @@ class LoopFile(Model):
     to_pv_range: Text | None = Field(default=None, description="Measurement range of the target: 0,1000 degF.")
     to_op_range: Text | None = Field(default=None, description="Output range of the target: 0,100 %.")
     process: Text | None = Field(default=None, description="The process, as `--process` takes it: gain=1.5,lag=10,delay=3.")
-    scan: Number | list[Number] | None = Field(
-        default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
-    )
-    runs_every: Number | list[Number] | None = Field(
-        default=None, max_length=2, min_length=1, description="Interval at which the source, or both, are really executed [s]."
-    )
+    scan: Interval | None = Field(default=None, description="Scan interval of both, or of source and target [s].")
+    runs_every: Interval | None = Field(default=None, description="Interval at which the source, or both, are really executed [s].")
     mode: Literal["auto", "cascade", "both"] | None = Field(default=None, description="Which setpoint counts.")
     action: Literal["reverse", "direct"] | None = Field(default=None, description="Action of the loop.")
     bias: Number | None = Field(default=None, description="Output at SP = PV of a loop without integral action [%].")
