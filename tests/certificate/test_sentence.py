@@ -150,7 +150,7 @@ def test_outputs_that_differ_since_the_rules_do_change_no_verdict() -> None:
 @pytest.mark.parametrize(
     ("aspect", "words"),
     [
-        ("error", "how small errors count"),
+        ("error", "what is done to the error"),
         ("output", "what is done to the output"),
         ("arithmetic", "the arithmetic they are computed with"),
     ],
@@ -178,8 +178,10 @@ def test_two_that_stay_apart_after_a_limit_are_not_called_alike() -> None:
 
 
 def test_a_setpoint_that_moves_otherwise_makes_setpoint_changes_different() -> None:
-    limited = (NonlinearDifference("setpoint", "setpoint rate limit", {}),)
+    limited = (NonlinearDifference("setpoint", "setpoint rate limit", {"setpoint rate limit [%/s]": (2.0, math.inf)}),)
     assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=limited)) == FEEDBACK + FIRST
+    in_manual = (NonlinearDifference("setpoint", "in manual the setpoint follows the measurement", {}),)
+    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=in_manual)) == EXACT
 
 
 @pytest.mark.parametrize(("cost", "coarse"), [(0.0009, False), (0.002, True)])

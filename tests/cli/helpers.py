@@ -39,6 +39,11 @@ def said(*words: str) -> Said:
     return Said(0 if status is None else int(status), out.getvalue(), err.getvalue())
 
 
+def answer(found: dict[str, Any]) -> dict[str, Any]:
+    """Return the JSON of a conversion without the request, which repeats how dials were typed: '2' on a command line."""
+    return {name: value for name, value in found.items() if name != "request"}
+
+
 def strict_json(text: str) -> Any:
     """Return what JSON text holds; NaN and Infinity are no JSON."""
 

@@ -48,8 +48,8 @@ CARDS_AND_OPTIONS = {
     "show block.yaml": "no file 'block.yaml'",
     "show fisher/provox FORM=Series": "fisher/provox: unknown setting or option 'FORM'; settings: GAIN, RESET, RATE; options: none",
     "show emerson/deltav FROM=Series": (
-        "emerson/deltav: unknown setting or option 'FROM' (did you mean 'FORM'?); settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA; "
-        "options: FORM, STRUCTURE"
+        "emerson/deltav: unknown setting or option 'FROM' (did you mean 'FORM'?); settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA, "
+        "PV_FTIME, SP_FTIME, ARW_HI_LIM, ARW_LO_LIM, NL_GAP, NL_MINMOD; options: FORM, STRUCTURE, FRSIPID_OPTS"
     ),
     "show emerson/deltav FORM=Seris": (
         "emerson/deltav: option FORM has no choice 'Seris' (did you mean 'Series'?); choices: Standard, Series"
@@ -112,10 +112,8 @@ SETTINGS = {
     f"convert {_PI} {_TO} --set GAIN=2": "emerson/deltav: GAIN is what the conversion computes; it cannot be given",
     f"convert {_PI} {_TO} --set ALFA=2": (
         "emerson/deltav: unknown setting 'ALFA' (did you mean 'ALPHA'?); "
-        "settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA, FORM, STRUCTURE"
-    ),
-    f"convert {_PI} {_TO} --to-pv-range 0,200": (
-        "fisher/provox: the target's PV range is 0 to 200, the source's is not given; give both, also where they agree"
+        "settings: GAIN, RESET, RATE, ALPHA, BETA, GAMMA, PV_FTIME, SP_FTIME, ARW_HI_LIM, ARW_LO_LIM, NL_GAP, NL_MINMOD, FORM, "
+        "STRUCTURE, FRSIPID_OPTS"
     ),
 }
 
@@ -152,8 +150,8 @@ USAGE = {
     ),
     f"convert {_PI} {_TO} --match best": (
         "convert",
-        "Invalid value for '--match': match is 'best'; it is one of exact, low-frequency, textbook, frequency, loop, constrained, "
-        "or frequency:0.02rad/s",
+        "Invalid value for '--match': match is 'best'; it is one of exact, same-numbers, low-frequency, textbook, frequency, loop, "
+        "constrained, or frequency:0.02rad/s",
     ),
     f"run {_PI}": ("run", "Missing option '--record'."),
     f"run {_PI} --record good.csv --scan fast": ("run", "Invalid value for '--scan': 'fast' is not a valid float."),
@@ -216,6 +214,12 @@ def test_a_record_in_another_encoding_is_refused(folder: Path) -> None:
     (folder / "bad.csv").write_bytes("sp,pv,Störung\n1,2,3\n".encode("latin-1"))
     message = error("bad.csv: not UTF-8 text; save the file as UTF-8")
     assert said("run", *_PI.split(), "--record", "bad.csv") == Said(2, "", message)
+
+
+def test_a_range_that_only_the_target_has_is_asked_about() -> None:
+    """It is a question and no wrong usage: the answer is a number of the plant."""
+    text = "fisher/provox: the target's PV range is 0 to 200, the source's is not given; give both, also where they agree"
+    assert said("convert", *_PI.split(), *_TO.split(), "--to-pv-range", "0,200") == Said(1, "", f"question: {text}\n")
 
 
 def test_an_unknown_command_is_refused_with_the_nearest_one() -> None:

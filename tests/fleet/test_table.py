@@ -88,7 +88,7 @@ WRONG = {
         "no card 'generic/standrd' (did you mean 'generic/standard'?); 'pidemu cards' lists them"
     ),
     "A,generic/standard,K=2; Ti=10; T=3,gain=1,,,,,,": (
-        "generic/standard: unknown setting 'T' (did you mean 'Ti'?); settings: K, Ti, Td, Tf, b, c"
+        "generic/standard: unknown setting 'T' (did you mean 'Ti'?); settings: K, Ti, Td, Tf, b, c, INTEGRAL_RULE, DERIVATIVE_RULE"
     ),
     "A,fisher/provox,,gain=1,,,,,,": (
         "fisher/provox: GAIN: missing; it sets the gain (% output per % PV), in %/%; "

@@ -50,8 +50,21 @@ def test_typical_settings_are_the_same_three_numbers_on_every_dial(name: str, de
     gain, integral, time = terms(settings)
     scale = abs(gain) if settings.equation.form == "parallel" else 1
     assert abs(gain) == 2
-    assert abs(integral) == pytest.approx(scale / 90, rel=5e-4)  # four digits
-    assert abs(time) == pytest.approx(10 * scale if derivative else 0, rel=5e-4)
+    half = {v.role: v.setting.resolution / 2 / v.value for v in settings.values() if v.setting.resolution and v.value}  # of a step
+    assert abs(integral) == pytest.approx(scale / 90, rel=max(5e-4, half.get(Role.INTEGRAL, 0)))  # four digits, else the dial's
+    assert abs(time) == pytest.approx(10 * scale if derivative else 0, rel=max(5e-4, half.get(Role.DERIVATIVE, 0)))
+
+
+def test_a_dial_with_a_resolution_is_set_to_what_it_can_show() -> None:
+    """UDC shows hundredths of a minute: a typical derivative time of 10 s is 0.17 min there."""
+    assert typical_settings(pidemu.load_card("honeywell/udc"))["RATE"].value == 0.17
+    [cell] = matrix(["honeywell/udc"], emulate=False).cells
+    assert cell.verdict == "exact"
+
+
+@pytest.mark.parametrize("name", CARDS)
+def test_no_typical_value_is_out_of_range(name: str) -> None:
+    settings = typical_settings(pidemu.load_card(name))
     assert settings.notes == ()
 
 

@@ -74,7 +74,7 @@ def _what_differs(c: Certificate) -> str:
 
 
 _PARTS: Final = {
-    "error": "how small errors count",
+    "error": "what is done to the error",
     "output": "what is done to the output",
     "arithmetic": "the arithmetic they are computed with",
 }

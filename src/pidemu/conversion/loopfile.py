@@ -7,14 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Discriminator, Field, Tag, ValidationError
 
 from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
 
-Interval = Number | Annotated[list[Number], Field(min_length=1, max_length=2)]
+Interval = Annotated[
+    Annotated[Number, Tag("one")] | Annotated[list[Number], Field(min_length=1, max_length=2), Tag("two")],
+    Discriminator(lambda given: "two" if isinstance(given, list) else "one"),  # so that an error is about what was written
+]
 
 
 class LoopFile(Model):

@@ -47,8 +47,8 @@ def typical_settings(card: Card, *, derivative: bool = True) -> Settings:
     All options are stated, so that nothing about them is left to be asked.
 
     Gain 2, integral time 90 s and derivative time 10 s; where the form is parallel, integral gain 2/90 1/s and derivative gain
-    20 s. Other dials are at the card's defaults, or at something sensible where it has none. Dials are rounded to four digits. A
-    value outside a dial's range gives way to the nearest inside, which `Settings.notes` then says.
+    20 s. Other dials are at the card's defaults, or at something sensible where it has none. Dials are rounded to their resolution
+    where the card states one, else to four digits. A value outside a dial's range gives way to the nearest inside, which `Settings.notes` then says.
 
     Parameters
     ----------
@@ -139,7 +139,8 @@ def _term(role: Role, canonical: float, setting: Setting, equation: Equation) ->
     off = off_values(setting)
     if canonical == 0 and off:
         return off[0]
-    return _rounded(from_canonical(role, canonical, parse_unit(setting.unit), _spans(equation)))
+    value = _rounded(from_canonical(role, canonical, parse_unit(setting.unit), _spans(equation)))
+    return value if setting.resolution is None else _rounded(round(value / setting.resolution) * setting.resolution)
 
 
 def _sensible(setting: Setting, equation: Equation) -> float:
