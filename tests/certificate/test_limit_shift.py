@@ -87,3 +87,10 @@ def test_options_that_make_a_block_positional_are_named() -> None:
     assert choices_that_hold(block.card, block.options) == ()  # it is incremental whatever is chosen
     deltav = DELTAV
     assert {"STRUCTURE": "1"} in choices_that_hold(deltav.card, deltav.options)
+
+
+def test_a_target_of_integer_arithmetic_is_tried_with_dials_that_it_can_hold() -> None:
+    """Toshiba's gain counts hundredths: 1.625 is not one, which was an error of the scan."""
+    source = pidemu.load_card("allen-bradley/plc5").settings(EQUATION="independent", KP=1.625, KI=0)
+    with pytest.raises(pidemu.ConversionRefusedError, match="cannot hold the output of a loop without integral action"):
+        pidemu.convert(source, "toshiba/pid3", emulate=False)

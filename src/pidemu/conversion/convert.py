@@ -23,7 +23,7 @@ from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
 from pidemu.conversion.questions import Question
-from pidemu.conversion.request import Request, read_request
+from pidemu.conversion.request import DIGITS, Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
@@ -196,7 +196,8 @@ def _forgetting(source: Settings, settings: Settings, request: Request, factor: 
     from pidemu.certificate.limit_shift import limit_shift
 
     scans = request.scan or (common_interval(source, settings),) * 2
-    shift = limit_shift(source, settings, scans, factor)
+    on_the_block, _ = rounded(settings, request.digits or DIGITS, request.given)  # integer arithmetic runs nothing else
+    shift = limit_shift(source, on_the_block, scans, factor)
     return f"{settings.card.id} cannot hold the output of a loop without integral action. {shift.text}" if shift.refuses else ""
 
 

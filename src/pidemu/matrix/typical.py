@@ -48,7 +48,8 @@ def typical_settings(card: Card, *, derivative: bool = True) -> Settings:
 
     Gain 2, integral time 90 s and derivative time 10 s; where the form is parallel, integral gain 2/90 1/s and derivative gain
     20 s. Other dials are at the card's defaults, or at something sensible where it has none. Dials are rounded to their resolution
-    where the card states one, else to four digits. A value outside a dial's range gives way to the nearest inside, which `Settings.notes` then says.
+    where the card states one, else to four digits. A value outside a dial's range gives way to the nearest inside, which
+    `Settings.notes` then says.
 
     Parameters
     ----------
