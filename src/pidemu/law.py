@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, Literal
 
@@ -284,7 +284,12 @@ class Law:
 
     @cached_property
     def _rational(self) -> tuple[Rational, Rational]:
-        return paths(self.algorithm, CONTINUOUS if self.scan is None else discrete_operators(self.algorithm, self.scan))
+        a = self.algorithm
+        if self.scan is None:
+            return paths(a, CONTINUOUS)
+        if not a.kd and a.filter_on == "term":  # nothing passes its filter, whose pole need not be stable then
+            a = replace(a, Tf=0.0)
+        return paths(a, discrete_operators(a, self.scan))
 
     @property
     def feedback(self) -> Rational:

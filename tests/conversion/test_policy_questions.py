@@ -1,0 +1,192 @@
+"""Units, ranges and questions, over all ordered pairs of cards."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import pidemu
+from pidemu.conversion.target import is_computed
+from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError, ScanError, SettingError
+from pidemu.settings import Settings
+from pidemu.units import Role
+from tests.cli.helpers import said, strict_json
+from tests.conversion.policy import PAIRS, RANGES, convert, converted, drawn, held, numbers, stated
+from tests.conversion.support import settings_that_act
+from tests.conversion.test_options import CARDS
+from tests.helpers import dials_of
+
+FACTORS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+"""Seconds in a unit, as everybody knows them."""
+
+
+def otherwise(unit: str, value: float) -> list[str]:
+    """A value in every other unit of the same quantity, worked out here: times, repeats per time, times per repeat, rates."""
+    for pattern, form, per in (
+        (r"(s|min|h)", "{}", 1), (r"(s|min|h)/repeat", "{}/repeat", 1),
+        (r"1/(s|min|h)", "1/{}", -1), (r"repeat/(s|min|h)", "repeat/{}", -1),
+    ):  # fmt: skip
+        match = re.fullmatch(pattern, unit)
+        if match:
+            found = [f"{value * (FACTORS[match[1]] / x) ** per!r} {form.format(name)}" for name, x in FACTORS.items()]
+            if "repeat" in unit and value:
+                seconds = (value * FACTORS[match[1]]) if per == 1 else FACTORS[match[1]] / value
+                found += [f"{seconds / x!r} {name}/repeat" for name, x in FACTORS.items()]
+                found += [f"{x / seconds!r} repeat/{name}" for name, x in FACTORS.items()]
+            return found
+    return []
+
+
+@given(data=st.data())
+@settings(max_examples=30)
+def test_the_same_times_in_another_unit_give_the_same_settings(data: st.DataObject) -> None:
+    source, target = drawn(data)
+    dials = {n: v for n, v in source.items() if v.given and not v.off and math.isfinite(v.value) and otherwise(v.unit, v.value)}
+    assume(dials)
+    texts = {n: data.draw(st.sampled_from(otherwise(v.unit, v.value))) for n, v in dials.items()}
+    try:
+        other = source.changed(texts)
+    except SettingError:  # the last digit leads out of the dial's range
+        assume(False)
+        raise
+    one, two = (converted(s, target) for s in (source, other))
+    assert one.verdict == two.verdict
+    assert one.settings.options == two.settings.options
+    # 1e-6: what an optimiser finds from a start that differs in the last digit
+    assert numbers(two.settings) == pytest.approx(numbers(one.settings), rel=1e-6, abs=1e-9)
+
+
+UNITS = [
+    ((0, 100, "degC"), (273.15, 373.15, "K"), 1.0),
+    ((0, 100, "degC"), (32, 212, "degF"), 5 / 9),
+    ((0, 10, "bar"), (0, 1000, "kPa"), 0.01),
+]
+"""One range in two units, and the gain per the second unit of a gain of 1 per the first."""
+
+
+@given(data=st.data(), same=st.sampled_from(UNITS))
+@settings(max_examples=30)
+def test_the_same_range_of_the_target_in_another_unit_changes_a_gain_per_unit_only(data: st.DataObject, same: Any) -> None:
+    source, target = drawn(data)
+    first, second, factor = same
+    source = source.changed({"pv_range": first})
+    one, two = (converted(source, target, to_pv_range=r) for r in (first, second))
+    assert (one.factor, one.verdict) == (two.factor, two.verdict)
+    assert one.settings.options == two.settings.options
+    for name, v in one.settings.items():
+        if not v.active or name in held(source, target) or not is_computed(one.settings.equation, name, v.role):
+            continue
+        engineering = one.settings.equation.signals == "engineering"
+        gain = v.role is Role.GAIN or (one.settings.equation.form == "parallel" and v.role in (Role.INTEGRAL, Role.DERIVATIVE))
+        if gain and not v.off and engineering and v.unit in ("eu/eu", "%/eu", "1/s", "1/min", "s", "min", "1"):
+            assert two.settings[name].value == pytest.approx(v.value * factor, rel=1e-6)
+        elif not gain and v.role in (Role.INTEGRAL, Role.DERIVATIVE):
+            assert two.settings[name].value == pytest.approx(v.value, rel=1e-6)
+
+
+@given(data=st.data())
+@settings(max_examples=50)
+def test_a_range_is_asked_for_exactly_where_a_wider_span_changes_a_dial(data: st.DataObject) -> None:
+    name, target = data.draw(st.sampled_from([p for p in PAIRS if not any(c.startswith("generic/") for c in p)]))
+    ranged = settings_that_act(data, pidemu.load_card(name)).changed(RANGES)
+    plain = ranged.card.settings(stated(ranged))
+    once = converted(ranged, target)
+    options = once.settings.options
+    wider = {"pv_range": (0, 200), "op_range": (0, 200)}
+    changes = set()
+    for which, span in wider.items():
+        other = converted(plain.changed({**RANGES, which: span}), target, options=options)
+        same = all(
+            math.isclose(v.value, other.settings[n].value, rel_tol=1e-5)
+            for n, v in once.settings.items()
+            if v.active and is_computed(once.settings.equation, n, v.role)
+        )
+        changes |= set() if same else {which}
+    try:
+        convert(plain, target, options=options, assume=False)
+        asked = set()
+    except QuestionError as error:
+        assume({q.kind for q in error.questions} == {"range"})
+        asked = {q.about for q in error.questions}
+    percent = [s.equation.output.limits for s in (plain, once.settings) if s.equation.signals == "engineering"]
+    if changes - asked == {"op_range"} and percent and all(-10 <= x[0] <= 0 and 100 <= x[1] <= 110 for x in percent):
+        return  # limits such as -5 to 105 are in percent
+    assert asked == changes
+
+
+PRODUCTS = [c for c in CARDS if pidemu.load_card(c).data.kind == "product" and pidemu.load_card(c).options]
+
+
+@given(data=st.data())
+@settings(max_examples=40)
+def test_an_option_is_asked_for_exactly_where_its_readings_are_ten_percent_apart_and_the_commands_answer(
+    data: st.DataObject,
+) -> None:
+    card = pidemu.load_card(data.draw(st.sampled_from(PRODUCTS)))
+    target = data.draw(st.sampled_from(CARDS))
+    dials = {n: x for n, x in data.draw(dials_of(card.id)).items() if n not in card.options}
+    try:
+        source = card.settings({**dials, **RANGES})
+    except PidemuError:  # dials that another choice has
+        assume(False)
+        raise
+    assume(any(source.law().moments()))
+    expected = set()
+    for name in source.defaulted:
+        for choice in card.options[name]:
+            try:
+                read = source.changed({name: choice})
+                lost = [x and not y for x, y in zip(gains(source), gains(read), strict=True)]
+            except PidemuError:
+                continue
+            if not any(lost):
+                off = apart(source, read)
+                assume(abs(off - 0.1) > 0.005)
+                expected |= {name} if off > 0.1 else set()
+    try:
+        convert(source, target, assume=False)
+        questions: tuple[Any, ...] = ()
+    except QuestionError as error:
+        questions = error.questions
+    except (ConversionRefusedError, ScanError):
+        assume(False)
+    assert {q.about for q in questions if q.kind == "option"} == expected
+    for question in questions[:1]:
+        for answer in question.readings[:2]:
+            if answer.conversion is not None and answer.command:
+                assert_the_command_gives(answer)
+
+
+def apart(a: Settings, b: Settings) -> float:
+    """Largest deviation of two laws over the loop band of the first, whichever of them counts as the truth."""
+    w = np.geomspace(0.01, 5, 3000) / a_time(a)
+    x, y = (s.law().response(w) for s in (a, b))
+    return float(max(np.max(np.abs(x / y - 1)), np.max(np.abs(y / x - 1))))
+
+
+def a_time(s: Settings) -> float:
+    m0, m1, m2 = s.law().moments()
+    return abs(m1 / m0) if m0 and m1 / m0 > 0 else 1 / abs(m0) if m0 else abs(m2 / m1) or 1.0
+
+
+def gains(s: Settings) -> tuple[float, float, float]:
+    a = s.algorithm()
+    return a.kp, a.ki, a.kd
+
+
+def assert_the_command_gives(answer: Any) -> None:
+    result = said(*shlex.split(answer.command)[1:], "--assume", "--json")
+    assert result.status == 0, result.err
+    printed = strict_json(result.out)["to"]
+    wanted = answer.conversion.settings.to_dict()
+    assert printed["options"] == wanted["options"]
+    assert {n: d["value"] for n, d in printed["settings"].items()} == {
+        n: pytest.approx(d["value"], rel=1e-12) for n, d in wanted["settings"].items()
+    }
