@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.conversion.target import is_computed
+from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError, ScanError, SettingError
 from pidemu.settings import Settings
 from pidemu.units import Role
@@ -190,3 +191,40 @@ def assert_the_command_gives(answer: Any) -> None:
     assert {n: d["value"] for n, d in printed["settings"].items()} == {
         n: pytest.approx(d["value"], rel=1e-12) for n, d in wanted["settings"].items()
     }
+
+
+@pytest.mark.parametrize(("reset", "asked"), [("1 min", False), ("0.97 min", False), ("0.4 min", True), ("9 min", True)])
+def test_a_time_for_a_dial_that_counts_a_rate_is_asked_about_where_it_matters(reset: str, asked: bool) -> None:
+    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=reset)
+    if asked:
+        with pytest.raises(QuestionError):
+            convert(source, "emerson/deltav", assume=False)
+    else:
+        assert convert(source, "emerson/deltav", assume=False).certificate.feedback.is_exact
+
+
+def test_a_time_for_a_rate_that_hardly_matters_is_answered_with_the_other_result_beside() -> None:
+    found = convert(pidemu.load_card("fisher/provox").settings(GAIN=2, RESET="0.97 min"), "emerson/deltav", assume=False)
+    assert found.settings["RESET"].value == pytest.approx(58.2, rel=1e-12)
+    assert [b.settings["RESET"].value for b in found.beside if b.kind == "unstated"] == pytest.approx([61.856], rel=1e-12)
+
+
+def test_what_the_headline_says_was_assumed_of_a_time_is_what_was_computed() -> None:
+    found = convert(pidemu.load_card("fisher/provox").settings(GAIN=2, RESET="0.4 min"), "emerson/deltav")
+    assert found.settings["RESET"].value == pytest.approx(24, rel=1e-12)
+    assert found.sentence.startswith("Assuming RESET = 0.4 min/repeat, which was not stated.")
+
+
+@given(data=st.data())
+@settings(max_examples=20)
+def test_the_reading_that_is_taken_is_the_one_that_is_computed_and_every_other_one_is_another_law(data: st.DataObject) -> None:
+    card = pidemu.load_card(data.draw(st.sampled_from(CARDS)))
+    dials = {n: x for n, x in data.draw(dials_of(card.id)).items() if n not in card.options}
+    try:
+        source = card.settings(dials)
+    except PidemuError:
+        assume(False)
+        raise
+    for found in unstated(source):
+        assert found.taken.settings.algorithm() == source.algorithm()
+        assert all(other.settings.algorithm() != source.algorithm() for other in found.others)
