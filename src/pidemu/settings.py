@@ -239,7 +239,7 @@ class Settings(Mapping[str, Value]):
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
-        return self.card.settings({**given, **values}).at_scan(self.scan)
+        return replace(self.card.settings({**given, **values}), pace=self.pace).at_scan(self.scan)
 
     def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.

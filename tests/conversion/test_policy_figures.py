@@ -80,7 +80,11 @@ EXCURSION = START - 45 * np.interp(np.arange(121), [0, 20, 80, 100, 120], [0.0, 
 
 def left_by_a_limit(s: Settings) -> float:
     """How far an excursion to a limit leaves the output from where it was, though the error is what it was."""
-    return abs(float(run(s, EXCURSION, 1.0, limits=(0.0, 100.0))[-1]) - START)
+    a = s.algorithm()
+    own = a.velocity or a.start == "load-output" or a.bias  # it counts from its last output, or holds what its output was
+    controller = pidemu.Controller(s, 1.0, output_limits=(0.0, 100.0), bias=0.0 if own else START, initial_output=START)
+    controller.rest(START, START, START)
+    return abs(float(controller.run(np.full_like(EXCURSION, START), EXCURSION)[-1]) - START)
 
 
 @pytest.mark.parametrize("source", P_ONLY, ids=lambda s: s.card.id)

@@ -16,6 +16,8 @@ import pidemu
 from pidemu.conversion.target import is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError, ScanError, SettingError
+from pidemu.loop.process import parse_process
+from pidemu.plain import json_safe
 from pidemu.settings import Settings
 from pidemu.units import Role
 from tests.cli.helpers import said, strict_json
@@ -186,11 +188,9 @@ def assert_the_command_gives(answer: Any) -> None:
     result = said(*shlex.split(answer.command)[1:], "--assume", "--json")
     assert result.status == 0, result.err
     printed = strict_json(result.out)["to"]
-    wanted = answer.conversion.settings.to_dict()
+    wanted = json_safe(answer.conversion.settings.to_dict())
     assert printed["options"] == wanted["options"]
-    assert {n: d["value"] for n, d in printed["settings"].items()} == {
-        n: pytest.approx(d["value"], rel=1e-12) for n, d in wanted["settings"].items()
-    }
+    assert {n: d["value"] for n, d in printed["settings"].items()} == {n: d["value"] for n, d in wanted["settings"].items()}
 
 
 @pytest.mark.parametrize(("reset", "asked"), [("1 min", False), ("0.97 min", False), ("0.4 min", True), ("9 min", True)])
@@ -228,3 +228,38 @@ def test_the_reading_that_is_taken_is_the_one_that_is_computed_and_every_other_o
     for found in unstated(source):
         assert found.taken.settings.algorithm() == source.algorithm()
         assert all(other.settings.algorithm() != source.algorithm() for other in found.others)
+
+
+TO_ASK: list[tuple[str, str, dict[str, object], str, dict[str, Any]]] = [
+    ("range", "bailey/fc19", {"K": 1, "KP": 2.5, "KI": 0.5, "KD": 0.2}, "emerson/deltav", {}),
+    ("scale", "fisher/provox", {"GAIN": 2, "RESET": 4, "pv_range": (0, 200)}, "emerson/deltav", {"to_pv_range": (0, 400)}),
+    ("action", "simple-pid/simple-pid", {"Kp": 2, "Ki": 0.1, **RANGES}, "emerson/deltav", {"action": "direct"}),
+    ("action", "epics/epid", {"KP": -2, "KI": 0.1, "KD": 0, **RANGES}, "oscat/ft-pid", {"action": "reverse"}),
+    ("mode", "yokogawa/fieldbus-pid", {"GAIN": 0.6, "RESET": 8}, "emerson/deltav", {}),
+    ("unit", "fisher/provox", {"GAIN": 2, "RESET": "0.4 min"}, "allen-bradley/pide", {}),
+    ("input", "oscat/ft-pid", {"KP": 2, "TN": 5, **RANGES}, "emerson/deltav", {}),
+    ("option", "allen-bradley/pide", {"PGain": 2, "IGain": 0.3, "DGain": 0.1}, "honeywell/tdc3000", {}),
+    ("option", "honeywell/tdc3000", {"K": 2, "T1": 0.5, "T2": 0.1}, "emerson/deltav", {}),
+]
+"""What has to be asked: kind, source with its settings, target, arguments."""
+HOW: list[dict[str, Any]] = [
+    {},
+    {"scan": (0.5, 1.0), "runs_every": 2.0, "process": parse_process("gain=1.5,lag=0.1,delay=7"), "tag": "TIC 101", "digits": 4},
+]
+
+
+@pytest.mark.parametrize("how", HOW, ids=["alone", "with everything else"])
+@pytest.mark.parametrize("asked", TO_ASK, ids=lambda x: f"{x[0]} {x[1]}")
+def test_the_command_of_every_answer_gives_what_the_answer_shows(asked: Any, how: dict[str, Any]) -> None:
+    kind, card, dials, target, arguments = asked
+    source = pidemu.load_card(card).settings(dials)
+    if source.equation.scan.interval == "measured":
+        how = {name: value for name, value in how.items() if name != "runs_every"}
+    with pytest.raises(QuestionError) as error:
+        pidemu.convert(source, target, **arguments, **how)
+    question = next(q for q in error.value.questions if q.kind == kind)
+    assert len(question.readings) <= 6
+    answered = [a for a in question.readings if a.conversion is not None]
+    assert answered
+    for answer in answered:
+        assert_the_command_gives(answer)
