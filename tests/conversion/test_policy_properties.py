@@ -67,8 +67,15 @@ def test_plain_settings_do_not_depend_on_the_scan_intervals(data: st.DataObject,
     assert numbers(at_scan.settings) == numbers(without.settings)
 
 
+def test_a_slow_scan_does_not_change_how_plain_settings_are_matched() -> None:
+    """At 2 s half the scan rate ends the loop band before 5/Ti, where the match without scan intervals is judged."""
+    source = pidemu.load_card("oscat/ft-pid").settings({"KP": 1, "TN": 1, "TV": 1, **RANGES})
+    without, at_scan = (convert(source, "advanced-pid/advanced-pid", given={"Tf": 1}, scan=h) for h in (None, (2.0, 1.0)))
+    assert numbers(at_scan.settings) == numbers(without.settings)
+
+
 @given(data=st.data(), scan=TWO_SCANS)
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_compensation_adds_no_derivative_and_turns_no_term_round(data: st.DataObject, scan: tuple[float, float]) -> None:
     source, target = drawn(data)
     a, b = source.algorithm(), converted(source, target, scan=scan, compensate=True).settings.algorithm()
