@@ -50,9 +50,14 @@ def _of_the_controllers(c: Certificate, conditions: Sequence[str]) -> str:
             f"For disturbances, and in stability, the new controller does what the old one did{limits}{_if(conditions)}; "
             f"{_setpoint(c)}."
         )
-    if law and not c.is_bent and (c.rounding or 0) <= COARSE:
+    if law and not c.is_bent and not c.shifts_for_good and (c.rounding or 0) <= COARSE:
         other = "" if c.setpoint_headline.is_exact else f" Setpoint changes differ too: {_setpoint(c)}."
         return f"The two equations are the same{_if(conditions)}; what differs is when they are computed.{other}"
+    if law and c.shifts_for_good:
+        return (
+            f"The two equations are the same{_if(conditions)}, but without integral action the new controller does not hold the "
+            "output as the old one did: see what to watch for."
+        )
     if law and c.is_bent:
         return (
             f"The two equations are the same{_if(conditions)}, but one controller does something to its signals that the other does"

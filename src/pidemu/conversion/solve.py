@@ -183,8 +183,8 @@ class Solver:
         return self.continuous_deviation(settings)
 
     def continuous_deviation(self, settings: Settings) -> float:
-        """Return the largest deviation of the continuous feedback paths in the loop band."""
-        band = bands(self.law, max(self.scans) if self.scans else None, self.process)[0]
+        """Return the largest deviation of the continuous feedback paths in the loop band, wherever a scan interval would end it."""
+        band = bands(self.law, None, self.process)[0]  # plain settings do not depend on the scan intervals
         return deviation(self.law, settings.law(), band, self.factor)
 
     def distance(self, settings: Settings) -> float:
