@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, Lag
 from pidemu.card.load import Card, Statement, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.ranges import PERCENT, SignalRange
@@ -123,6 +123,9 @@ class Settings(Mapping[str, Value]):
     pace : float
         Interval at which the algorithm is really executed per the interval it computes with. All its times are this much longer:
         integral and derivative time, filters, ramps; the gain stays (specs/equations.md, section 3).
+    lag : float
+        A first-order lag on the measurement in front of the block, which is not a dial of it [s]: what a conversion asks for where
+        the source filters its measurement and the target cannot. 0 where there is none.
     scan : float or None
         Scan interval at which dials that count in scans are read [s], the card's unless stated; ``None`` where it has none.
     """
@@ -134,6 +137,7 @@ class Settings(Mapping[str, Value]):
     notes: tuple[str, ...] = field(default=(), compare=False)
     defaulted: tuple[str, ...] = field(default=(), compare=False)
     pace: float = 1.0
+    lag: float = 0.0
     scan: float | None = field(default=None, compare=False)
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -267,7 +271,8 @@ class Settings(Mapping[str, Value]):
         key = (own_units and equation.signals == "engineering", scan if timed else None)  # what makes a difference
         if key not in self._algorithms:
             declared = self.scan if real is None else real / self.pace
-            self._algorithms[key] = algorithm_of(self, own_units=own_units, scan=declared).paced(self.pace)
+            found = algorithm_of(self, own_units=own_units, scan=declared).paced(self.pace)
+            self._algorithms[key] = replace(found, pv_filter=Lag(self.lag)) if self.lag and found.pv_filter is None else found
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, Final, Literal, cast
 
 from pidemu import law as laws
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm import Algorithm, Lag
 from pidemu.canonical import Reader, algorithm_as_read, default_scan
 from pidemu.exact_numbers import Exact, as_typed, exact
 from pidemu.ranges import SignalRange
@@ -172,7 +172,11 @@ def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None
         A number is not known exactly.
     """
     read = algorithm_as_read(ExactReader(settings, exact_spans(settings), dials=dials or {}))
-    return read if settings.pace == 1 else read.paced(cast(float, as_typed(settings.pace)))
+    if settings.pace != 1:
+        read = read.paced(cast(float, as_typed(settings.pace)))
+    if settings.lag and read.pv_filter is None:
+        read = replace(read, pv_filter=Lag(cast(float, as_typed(settings.lag))))
+    return read
 
 
 def in_mode(a: Algorithm, path: PathName) -> Algorithm:

@@ -80,7 +80,13 @@ def _linear_part(record: StandardRecord) -> StandardRecord:
 
 
 def emulated(
-    source: Settings, target: Settings, scans: tuple[float, float], factor: float = 1.0, *, taken: bool = False
+    source: Settings,
+    target: Settings,
+    scans: tuple[float, float],
+    factor: float = 1.0,
+    *,
+    taken: bool = False,
+    in_cascade: bool = False,
 ) -> ScanByScan:
     """Run both controllers on the linear part of the standard record and compare their outputs.
 
@@ -94,6 +100,8 @@ def emulated(
         What the source's gain is multiplied by for new signal ranges; negative where the action changes.
     taken : bool
         Whether nobody gave these intervals.
+    in_cascade : bool
+        Whether the setpoint is a remote one.
 
     Raises
     ------
@@ -105,7 +113,7 @@ def emulated(
     mine_at, theirs_at = _times(record), _times(other)
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
     actions = acting_alike(target, factor)
-    mine, theirs = _Bench(source, scans[0], actions[0]), _Bench(target, scans[1], actions[1])
+    mine, theirs = (_Bench(s, h, action, in_cascade) for s, h, action in zip((source, target), scans, actions, strict=True))
     ours = REST + abs(factor) * (mine.outputs(record) - REST)
     apart = _apart(ours, theirs.outputs(other)[at])
     exact = bool(np.max(apart) <= EXACT * 100)  # then they agree on the measurement alone as well
@@ -160,7 +168,8 @@ def _apart(ours: Floats, theirs: Floats) -> Floats:
 class _Bench:
     """A controller that begins every record at rest."""
 
-    def __init__(self, settings: Settings, h: float, action: Action) -> None:
+    def __init__(self, settings: Settings, h: float, action: Action, in_cascade: bool) -> None:
+        self._in_cascade = in_cascade
         self._scale = Scale(settings)
         self._controller, _ = controller_for(settings, Timing(h), action, WIDE, REST)
         self._rest: dict[str, float] | None = None
@@ -174,4 +183,5 @@ class _Bench:
         else:  # every record begins at the same rest
             self._controller.reset()
             self._controller.start(**self._rest)
-        return self._scale.output_percent(self._controller.run(own.sp, own.pv))
+        remote = own.sp if self._in_cascade else None
+        return self._scale.output_percent(self._controller.run(own.sp, own.pv, cascade=remote))

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pidemu.certificate.models import COARSE, Certificate, Kick, LoopComparison, ScanCost
 
 
-def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[str] = ()) -> str:
+def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[str] = (), lag: str = "") -> str:
     """Return what the certificate amounts to, in words a technician understands.
 
     Parameters
@@ -19,7 +19,10 @@ def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[s
         Facts that the verdict rests on, to stand behind "if".
     assumed : sequence of str
         What was taken though it should have been asked.
+    lag : str
+        The lag that the verdict supposes on the measurement in front of the new block; empty where there is none.
     """
+    conditions = [*([f"a lag of {lag} is put on PV in front of it"] if lag else []), *conditions]
     parts = [_assuming(assumed), _of_the_controllers(c, conditions), *_of_the_scans(c), *_of_the_loop(c.loop)]
     return " ".join(filter(None, parts))
 

@@ -148,7 +148,11 @@ def _target(c: Conversion) -> None:
             rule = number(book[name].value) if book is not None and name in book else "-"
             rows.append([name, number(v.value), unit_of(v), other_units(v), rule])
     table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
-    wrapped(rounding_line(c.certificate, c.request.digits), "  ")
+    if s.lag:
+        click.echo(f"  in front of it, on PV: a first-order lag of {number(s.lag)} s")
+    line = rounding_line(c.certificate, c.request.digits)
+    if line:
+        wrapped(line, "  ")
 
 
 def _figures(c: Certificate) -> None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from pidemu.certificate.figures import number, percent
 from pidemu.certificate.models import Kick
 from pidemu.certificate.noise import noise_change
+from pidemu.conversion.modes import Mode, in_mode
 from pidemu.conversion.spans import range_questions, rescaling, signals_note
 from pidemu.units import Role, parse_unit
 
@@ -26,6 +29,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
     said = (
         *([f"These are only the nearest settings: {c.refusal}"] if c.refusal else []),
         *(d.text for d in c.certificate.nonlinear if d.inside_limits),
+        _lag(c),
         *_setpoint(c),
         noise_change(c.source, c.settings, c.scan, c.factor).text,
         *(d.text for d in c.certificate.nonlinear if not d.inside_limits),
@@ -62,12 +66,26 @@ def _counted_in_scans(c: Conversion) -> Iterator[str]:
             yield f"{s.card.id}: {names} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
 
 
+def _lag(c: Conversion) -> str:
+    """Return what to put in front of the new block, where it cannot filter its measurement as the old one does."""
+    if not c.settings.lag:
+        return ""
+    work = c.ranking[0].solver
+    assert work is not None
+    without = percent(work.continuous_deviation(replace(c.settings, lag=0.0)))
+    return (
+        f"The old controller filters PV, the new block cannot: put a first-order lag of {number(c.settings.lag)} s on PV in front "
+        f"of it, as the figures suppose; without it the two differ by {without} in the loop band"
+    )
+
+
 def _setpoint(c: Conversion) -> Iterator[str]:
     """Yield how setpoint changes differ, before and after, and what would make them alike."""
     if (c.certificate.setpoint_before_rounding or c.certificate.setpoint).is_exact:
         return
     kick = c.certificate.setpoint_kick
-    old, new = c.source.algorithm(), c.settings.algorithm()
+    mode: Mode = "cascade" if c.request.mode == "cascade" else "auto"
+    old, new = (in_mode(s.algorithm(), mode) for s in (c.source, c.settings))
     lost, gained = old.kp and old.b and not new.b, new.kp and new.b and not old.b
     if not _alike(kick):
         yield f"Setpoint steps: with the old controller the output {_jumps(kick.source)}, with the new one it {_jumps(kick.target)}"

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _DIALS: Final = (Role.MULTIPLIER, Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 _NEAR: Final = 0.01
 """Deviation in the loop band below which the source's own numbers stand beside an exact match."""
+_FAR: Final = 0.2
+"""Deviation in the loop band from which settings are not worth a line."""
 _DIGITS: Final = 4
 
 
@@ -31,7 +33,7 @@ class Beside:
 
     Attributes
     ----------
-    kind : {"runner-up", "same-numbers", "matched", "compensated", "unstated"}
+    kind : {"runner-up", "same-numbers", "matched", "absorbed", "compensated", "unstated"}
         What they are.
     text : str
         The settings in one line, with what they cost.
@@ -109,6 +111,7 @@ def stands_beside(c: Conversion) -> Iterator[Beside]:
         yield other
     yield from _own_numbers(c)
     yield from _matched(c)
+    yield from _absorbed(c)
     yield from _compensated(c)
     yield from _unstated(c)
 
@@ -135,6 +138,24 @@ def _matched(c: Conversion) -> Iterator[Beside]:
         if _is_another(c.unrounded, found):
             off = percent(work.continuous_deviation(found))
             yield Beside("matched", f"matched at low frequencies: {_dials(found)}, {off}", found, "--match low-frequency")
+
+
+def _absorbed(c: Conversion) -> Iterator[Beside]:
+    """Yield settings that take a filter of the measurement into the dials, beside those that need a lag in front of the block."""
+    if not c.settings.lag:
+        return
+    from pidemu.conversion.convert import converted
+
+    with suppress(PidemuError):
+        request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
+        found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
+        off = percent(found.certificate.feedback.loop_band.max_deviation)
+        yield Beside(
+            "absorbed",
+            f"without the lag, absorbed into the dials: {_dials(found.settings)}, {off}",
+            found.settings,
+            "--match low-frequency",
+        )
 
 
 def _compensated(c: Conversion) -> Iterator[Beside]:

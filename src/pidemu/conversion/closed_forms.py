@@ -50,11 +50,16 @@ class ClosedForms:
         self.mode = mode
         algorithm = in_mode(source.algorithm(), mode)
         self.law = Law(algorithm)
-        self.scaled = Law(scaled(algorithm, factor))
+        self.matched = Law(self._as_matched(algorithm))
+        """What is matched: the law without a filter of the measurement that both have alike."""
+        self.scaled = Law(scaled(self.matched.algorithm, factor))
         self.original_filter = target.filter
         gain = source.by_role(Role.GAIN)
         if gain is not None and not algorithm.kp:
             target.idle_gain = gain.canonical or 1.0
+
+    def _as_matched(self, a: Algorithm) -> Algorithm:
+        return replace(a, pv_filter=None) if self.target.is_paired else a
 
     def textbook(self) -> Settings:
         """Return what the rule in manuals gives.
@@ -216,7 +221,8 @@ class ClosedForms:
 
     def _with_the_moments(self, settings: Settings) -> Settings:
         """Return the settings or, behind a filter that no closed form knows, such that have the moments."""
-        wanted, found = self.scaled.moments(), settings.law().moments()  # of the feedback path, which no mode changes
+        wanted = self.scaled.moments()
+        found = Law(self._as_matched(settings.algorithm())).moments()  # of the feedback path, which no mode changes
         if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
             return settings
         return self.through(lambda problem, _: meet(problem), settings)
@@ -262,6 +268,7 @@ class ClosedForms:
             return replace(next(iter(self._matched((*moments[:2], 0.0), self.target.filter))), kd=0.0)
 
         wanted, scan = at_scan or (self.law, None)
+        wanted = Law(self._as_matched(wanted.algorithm), wanted.scan)
         problem = Problem(Law(scaled(wanted.algorithm, self.factor), wanted.scan), self.target, numbers, scan)
         return self.weighted(numbers(solve(problem, self.scaled.moments())), problem)
 

@@ -39,6 +39,8 @@ from pidemu.units import Role
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
+_PAIRED = (None, "exact", "same-numbers")
+"""Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
 _SMALLEST, _LARGEST = 1e-120, 1e120
 """Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
@@ -251,6 +253,8 @@ class _Work:
         self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
         self.fixed = {**_shared(source, card), **request.given}
         self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
+        lag = source.algorithm(scan=request.scan[0] if request.scan else None).pv_filter
+        self.source_lag = lag.time if lag is not None and self.aim.match in _PAIRED else None
         if request.scan is not None:
             source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
@@ -262,7 +266,7 @@ class _Work:
             source = self.source
             ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
             scan = request.declared[1] if request.declared else None
-            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan)
+            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan, self.source_lag)
             goal.reject_missing()
             sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
             return Solver(

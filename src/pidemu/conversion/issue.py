@@ -46,7 +46,7 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
         certificate = replace(certificate, loop=compare_loops(source, settings, work.process, work.scans, work.factor))
     try:
         scans = work.scans or (common_interval(source, settings),) * 2
-        both = emulated(source, unrounded, scans, work.factor, taken=work.scans is None)
+        both = emulated(source, unrounded, scans, work.factor, taken=work.scans is None, in_cascade=work.first_mode == "cascade")
     except ScanError as error:
         return replace(certificate, not_emulated=str(error))
     return replace(

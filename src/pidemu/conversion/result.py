@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from pidemu.action import action_line, action_words, carried_action
+from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
@@ -141,7 +142,11 @@ class Conversion:
     @property
     def sentence(self) -> str:
         """The verdict in a sentence or two for whoever stands at the loop, with the conditions that it rests on."""
-        return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed)
+        return sentence(self.certificate, [str(c) for c in self.conditions if c.headline], self.assumed, self._lag)
+
+    @property
+    def _lag(self) -> str:
+        return f"{number(self.settings.lag)} s" if self.settings.lag else ""
 
     @cached_property
     def at_the_loop(self) -> tuple[str, ...]:
@@ -258,4 +263,5 @@ class Conversion:
         plain = self.settings.to_dict()
         for name, dial in plain["settings"].items():
             dial["unrounded"] = self.unrounded[name].value
+        plain["lag_on_pv"] = self.settings.lag
         return plain

@@ -207,7 +207,7 @@ class Solver:
     def _nearest(self) -> Settings:
         # nothing imitates a missing proportional term
         idle = not self.forms.scaled.algorithm.kp and self.target.has_proportional
-        numbers = None if idle else nearest(self.law, self.target, self.factor, self.process)
+        numbers = None if idle else nearest(self.forms.matched, self.target, self.factor, self.process)
         if numbers is None:
             raise SettingError("no settings come near")
         return self.forms.weighted(numbers)

@@ -146,6 +146,9 @@ class Target:
         Interval at which the target is really executed per the one that it computes with; see `Settings.pace`.
     scan : float, optional
         Scan interval that it computes with [s], for dials that count in scans; by default the card's.
+    source_lag : float, optional
+        The lag with which the source filters its measurement [s], where the target is to have it too, in its own filter or in front
+        of it; ``None``: whatever filters the target has are part of what is matched.
     """
 
     def __init__(
@@ -157,6 +160,7 @@ class Target:
         op_range: SignalRange | None,
         pace: float = 1.0,
         scan: float | None = None,
+        source_lag: float | None = None,
     ) -> None:
         self.card = card
         self.pace = pace
@@ -169,12 +173,28 @@ class Target:
         self.form = self.variant.equation.form
         self.idle_gain = 1.0
         """Gain taken where there is no proportional term, so that the gain only scales the two times."""
+        self.lag = 0.0
+        """A lag in front of the block [s]."""
+        self.is_paired = source_lag is not None
+        """Whether source and target filter the measurement alike, so that the rest is matched as if neither did."""
+        if source_lag is not None:
+            self._filter_the_measurement(source_lag)
         self._check_given()
         dial = self.dial(Role.MULTIPLIER)
         self.multiplier = self.template()[dial[0]].canonical if dial is not None else 1.0
         """Overall multiplier of all three terms."""
         self.filter = self._find_filter()
         """The filter, whether it is free and, once a match has fixed it, its value."""
+
+    def _filter_the_measurement(self, lag: float) -> None:
+        """Set the target's own filter on the measurement to a lag [s], or ask for one in front of the block."""
+        measurement = self.variant.equation.measurement
+        name = None if measurement is None or measurement.filter is None else measurement.filter.time
+        if not isinstance(name, str):
+            self.lag = lag
+        elif name.casefold() not in {n.casefold() for n in self.given}:
+            setting = self.variant.equation.settings[name]
+            self.given[name] = from_canonical(Role.FILTER_TIME, lag / self.pace, parse_unit(setting.unit), self.spans)
 
     def _check_given(self) -> None:
         known = {n.casefold(): n for n in self.variant.equation.settings}
@@ -241,7 +261,8 @@ class Target:
     @cached_property
     def shape(self) -> Algorithm:
         """The target's algorithm with placeholder numbers, for everything but its numbers."""
-        return self.template().algorithm()
+        found = self.template().algorithm()
+        return replace(found, pv_filter=None) if self.is_paired else found
 
     def template(self, **extra: object) -> Settings:
         """Return settings with placeholder numbers in the dials that a conversion computes."""
@@ -250,7 +271,8 @@ class Target:
             if name not in values and (setting.default is None or setting.sets in ("gain", "integral", "derivative")):
                 undefined = setting.sets == "derivative" and self.form is Form.SERIES and not self.has_proportional
                 values[name] = (*off_values(setting), 0.0)[0] if undefined else _placeholder(setting)
-        return replace(self.card.settings({**self.variant.chosen, **values, **self.ranges}), pace=self.pace).at_scan(self.scan)
+        settings = self.card.settings({**self.variant.chosen, **values, **self.ranges})
+        return replace(settings, pace=self.pace, lag=self.lag).at_scan(self.scan)
 
     def settings(self, n: Numbers) -> Settings:
         """Return the target's settings for canonical numbers.
@@ -261,7 +283,7 @@ class Target:
             A dial would leave its range, or a term that cannot be switched off would have to be.
         """
         dials = {**self.options, **self._idle(), **self.given, **self._dials(n), **self.ranges}
-        return replace(self.card.settings(dials), pace=self.pace).at_scan(self.scan)
+        return replace(self.card.settings(dials), pace=self.pace, lag=self.lag).at_scan(self.scan)
 
     def _idle(self) -> dict[str, object]:
         """Return values for filter and weights that have no default, where nothing depends on them."""
