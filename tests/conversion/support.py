@@ -82,8 +82,12 @@ def needed(card: Card, options: dict[str, object] | None = None) -> dict[str, ob
     }
 
 
+HUNDRED: dict[str, object] = {"pv_range": (0, 100), "op_range": (0, 100)}
+"""Ranges as they are stated where a test is about something else: a unit is then a percent on either side."""
+
+
 def settings_that_act(data: st.DataObject, card: Card) -> Settings:
-    """Draw settings of a card with at least one term; with none there is no law to compare."""
-    drawn = settings_of(data, card)
+    """Draw settings of a card, with ranges of 0 to 100 and at least one term; with none there is no law to compare."""
+    drawn = settings_of(data, card).changed(HUNDRED)
     assume(any(drawn.law().moments()))
     return drawn
