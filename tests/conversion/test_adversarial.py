@@ -13,7 +13,7 @@ import pidemu
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
-from tests.conversion.support import Complex, Floats, continuous, needed, outputs
+from tests.conversion.support import HUNDRED, Complex, Floats, continuous, needed, outputs
 from tests.conversion.test_options import CARDS
 from tests.helpers import WIDE
 
@@ -39,7 +39,9 @@ DIALS = {
 
 
 def load(card: str, **dials: object) -> Settings:
-    return pidemu.load_card(card).settings(dials)
+    """Settings with ranges of 0 to 100 and, where they are not named, the options as the card delivers them."""
+    options = {n: c for n, c in pidemu.load_card(card).variant({}).chosen.items() if n.casefold() not in {d.casefold() for d in dials}}
+    return pidemu.load_card(card).settings({**HUNDRED, **options, **dials})
 
 
 def made(card: str, ratio: float, **more: object) -> Settings:

@@ -193,22 +193,34 @@ def deviation(c: pidemu.Conversion, scans: tuple[float, float]) -> float:
 
 
 @pytest.mark.parametrize(
-    ("scans", "at", "phase"),
+    ("scans", "phase"),
     [
-        ((1.0, 0.5), 0.1, -1.432394),  # at 2/Ti: 0.1 x (-0.5)/2 rad
-        ((0.5, 1.0), 0.1, 1.432394),
-        ((2.0, 2.0), 0.1, 0.0),
-        ((1.0, 20.0), 0.1, 54.431011),  # 0.1 x 19/2
-        ((1.0, 40.0), 0.1, math.inf),  # beyond half the slower scan's rate
+        ((1.0, 0.5), -1.140248),  # the hold alone: 0.1 x (-0.5)/2 rad, -1.43 degrees; the sum that integrates leads by the rest
+        ((0.5, 1.0), 1.140248),
+        ((2.0, 2.0), 0.0),
+        ((1.0, 20.0), 40.527261),
+        ((1.0, 40.0), math.inf),  # beyond half the slower scan's rate
     ],
 )
-def test_the_scan_cost_is_half_the_difference_of_the_intervals_as_dead_time(
-    scans: tuple[float, float], at: float, phase: float
+def test_the_scan_cost_is_the_phase_that_hold_and_rule_lose_where_the_crossover_usually_lies(
+    scans: tuple[float, float], phase: float
 ) -> None:
     plain = convert(settings("generic/standard", K=2, Ti=20), "generic/parallel", scan=scans, compensate=False)
     cost = plain.certificate.scan_cost
     assert cost is not None
-    assert (cost.at, cost.phase_deg) == pytest.approx((at, phase), rel=1e-6)
+    assert cost.at == pytest.approx(0.1, rel=1e-12)  # 2/Ti
+    assert cost.phase_deg == pytest.approx(phase, rel=1e-6)
+    assert math.isinf(phase) or cost.phase_deg == pytest.approx(lost(*scans), rel=1e-9, abs=1e-12)
+
+
+def lost(h: float, to: float) -> float:
+    """Phase lost by a PI of 2 and 20 s at 0.1 rad/s, backward rule and hold written out, from one interval to another [deg]."""
+
+    def held(h: float) -> complex:
+        z = np.exp(-0.1j * h)
+        return complex((2 + 0.1 * h / (1 - z)) * (1 - z) / (0.1j * h))
+
+    return math.degrees(np.angle(held(h) / held(to)))
 
 
 def test_without_scan_intervals_there_is_no_scan_cost() -> None:
@@ -301,7 +313,9 @@ def test_setpoint_weights_are_those_of_the_sampled_path() -> None:
 def test_a_forward_rule_gets_a_filter_with_which_it_is_stable_at_the_scan() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=30, Td=5, Tf=0.5)
     options = {"FORM": "parallel", "IFormula": "ForwardEuler", "DFormula": "ForwardEuler"}
-    conversion = pidemu.convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options, emulate=False)
+    with pytest.raises(ScanError, match=r"too short for the scan interval 1 s: the forward rule is unstable"):
+        convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options, compensate=False)
+    conversion = convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options)
     assert conversion.settings["Tf"].canonical >= 1.0  # 1 - h/Tf is the pole: below h it rings, below h/2 it is unstable
     out = pidemu.Controller(conversion.settings, 1.0, output_limits=WIDE).run(50.0, 50.0 + (np.arange(60) >= 5))
     steps = np.diff(out[7:])
@@ -310,6 +324,7 @@ def test_a_forward_rule_gets_a_filter_with_which_it_is_stable_at_the_scan() -> N
 
 def test_a_filter_that_rings_is_named_among_the_warnings() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=20, Td=4, Tf=0.5)
-    conversion = pidemu.convert(source, "modelica/limpid", scan=(0.5, 2.0), given={"Nd": 50}, emulate=False)
+    method = {"METHOD": "continuous"}  # trapezoidal rules
+    conversion = pidemu.convert(source, "modelica/limpid", options=method, scan=(0.5, 2.0), given={"Nd": 50}, emulate=False)
     assert conversion.settings.algorithm().Tf < 1.0
     assert any("a scan interval of 2 s is long for modelica/limpid" in w and "rings" in w for w in conversion.warnings)
