@@ -45,7 +45,7 @@ def test_with_the_action_that_the_warnings_say_both_outputs_move_the_same_way(so
     before = first_moves(old, "reverse")
     for target in CARDS:
         held = {} if target == source else needed(pidemu.load_card(target))
-        conversion, reason = settled(old, target, given=held)
+        conversion, reason = settled(old, target, given=held, mode="auto")
         if conversion is None:
             assert "no proportional action" in reason
             continue
