@@ -91,3 +91,11 @@ def settings_that_act(data: st.DataObject, card: Card) -> Settings:
     drawn = settings_of(data, card).changed(HUNDRED)
     assume(any(drawn.law().moments()))
     return drawn
+
+
+def rules(settings: Settings) -> list[object]:
+    """Rules of the terms that are in use, and the number format."""
+    a = settings.algorithm()
+    lags = [lag for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
+    used = [a.ki and a.integral_rule, a.kd and a.derivative_rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
+    return [*used, a.precision, a.previous_pv]

@@ -130,7 +130,8 @@ def test_the_moments_of_what_a_process_sees_agree(name: str, Ti: float, Td: floa
         found = convert(source, target, options=options, scan=scans)
     except ScanError:  # the forward rule needs a filter longer than half a scan
         assume(False)
-    assume(found.certificate.compensated and found.match == "low-frequency")  # else moments that agree would be farther off in the loop band
+    # else moments that agree would be farther off in the loop band
+    assume(found.certificate.compensated and found.match == "low-frequency")
     assume(memory(found.settings, scans[1]) < 500)  # the trapezoidal rule rings with a short filter, and the sums lose digits
     wanted, reached = seen(source, scans[0]), seen(found.settings, scans[1])
     sizes = 1.5 / Ti, 1.5, 1.5 * Ti, 1.5 * Ti**2

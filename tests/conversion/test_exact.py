@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import ConversionRefusedError, ScanError
-from pidemu.settings import Settings
-from tests.conversion.support import Floats, difference, outputs, random_signal, settings_that_act
+from tests.conversion.support import HUNDRED, Floats, difference, outputs, random_signal, rules, settings_that_act
 
 ROUNDING = 1e-9
 """Of the span, or of what the outputs move over: sums over 200 scans of doubles, with a margin of a thousand and more."""
@@ -45,7 +44,6 @@ SERIES = {"K": 2, "Ti": 30, "Td": 6, "alpha": 0.1}
 UDC = {"GAIN": 2, "RSET": 1, "RATE": 0.1}
 BAILEY = {"K": 2, "KP": 1.5, "KI": 0.6, "KD": 0.2}
 TDC = {"K": 2, "T1": 1, "T2": 0.25, "FORM": "interactive"}
-HUNDRED = {"pv_range": (0, 100), "op_range": (0, 100)}
 
 EXACT = [
     Pair("generic/standard", STANDARD, "generic/parallel"),
@@ -206,14 +204,6 @@ def test_exact_with_the_same_scan_rules_is_what_the_emulated_controllers_show(
     if claimed or rules(conversion.source) == rules(conversion.settings):
         # the law's verdict is relative, per frequency, to 1e-9; an output adds up 120 scans of it
         assert difference(a, b) < 100 * ROUNDING
-
-
-def rules(settings: Settings) -> list[object]:
-    """Rules of the terms that are in use, and the number format."""
-    a = settings.algorithm()
-    lags = [lag for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
-    used = [a.ki and a.integral_rule, a.kd and a.derivative_rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
-    return [*used, a.precision, a.previous_pv]
 
 
 @pytest.mark.parametrize(
