@@ -162,8 +162,8 @@ class ClosedForms:
         """Match the moments, with the filter as the target fixes it or as it is delivered.
 
         A filter that can be set takes the source's filter time where it costs more than 1 % in the loop band to leave it, and the
-        source's filter is documented, measured or inferred: an assumed one is not imitated, and neither is the lack of one. With its
-        filter the source's own gain and integral may come nearer than the moments; with `moments` these are kept even so.
+        source's filter is documented, measured or inferred: an assumed one is not imitated, and neither is the lack of one. With
+        that filter the source's own gain and integral may come nearer than the moments; with `moments` these are kept even so.
         """
         original = self.target.filter
         delivered = replace(original, free=False)
@@ -186,7 +186,7 @@ class ClosedForms:
         return settings
 
     def _with_the_sources_filter(self, *, moments: bool) -> Settings | None:
-        """Return what is nearest with the source's filter time: the same moments or, unless these are to be kept, its own numbers."""
+        """Return what is nearest with the source's filter time: the same moments or, where these may go, its own numbers."""
         found: list[Settings] = []
         if not moments:
             with suppress(NoMatchError, SettingError):
