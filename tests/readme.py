@@ -1,11 +1,31 @@
-"""The commands of the README and what they print; ``python -m tests.readme`` writes what they print today into it."""
+"""README and docs: what their commands print, and their code.
+
+``python -m tests.readme`` writes what the commands print today into every page; with ``--picture`` it also takes the picture of a
+certificate, for which a Chromium is needed.
+
+A comment in a page, in the line before a block, says more about it:
+
+- ``<!-- shown: To until RATE; Verdict -->``: parts of what the command prints are shown, ``[...]`` for what was left out.
+  A part goes from the first line that begins with its first word or words until before the next one that begins with the second,
+  or until an empty line;
+- ``<!-- file: loops.csv -->``: the commands and the code of the page find the block in a file of that name;
+- ``<!-- part of: vendors/fisher/provox.yaml -->``: the block stands in that file, word for word.
+"""
 
 from __future__ import annotations
 
-import os
+import ast
+import contextlib
 import re
 import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from click.testing import CliRunner
 
@@ -13,46 +33,190 @@ from pidemu.cli import cli
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
-_BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+PAGES = (README, *sorted((ROOT / "docs").glob("*.md")))
+PICTURE = ROOT / "docs" / "certificate.png"
+PICTURED = "convert fisher/provox GAIN=2 RESET=4 RATE=0.1 --to emerson/deltav"
+"""The conversion of the README, whose certificate is pictured."""
+CUT = "[...]"
+CONSOLE = re.compile(
+    r"^(?P<head>(?:<!-- shown: (?P<parts>.*) -->\n)?```console\n\$ pidemu (?P<command>.*)\n)(?P<printed>(?:.*\n)*?)```$",
+    re.MULTILINE,
+)
+_PYTHON = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_FILE = re.compile(r"^<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_PART = re.compile(r"^<!-- part of: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
-def blocks(text: str) -> list[tuple[str, str]]:
-    """Return command and printed output of every console block."""
-    found = []
-    for body in _BLOCK.findall(text):
-        command, _, printed = body.partition("\n")
-        assert command.startswith("$ pidemu "), command
-        found.append((command.removeprefix("$ pidemu "), printed))
+def signed_certificate(folder: Path) -> None:
+    """Put the signed certificate of docs/certificate.md and its corrected card into a folder."""
+    found = re.search(r"^    pidemu (.*) --html .*$", read(ROOT / "docs" / "certificate.md"), re.MULTILINE)
+    assert found is not None
+    (folder / "TIC-101.json").write_text(printed_by(f"{found[1]} --date 2026-07-01 --json"), encoding="utf-8")
+    (folder / "cards" / "fisher").mkdir(parents=True)
+    card = (ROOT / "vendors" / "fisher" / "provox.yaml").read_text(encoding="utf-8")
+    for old, new in (
+        ("ratio: 0.125", "ratio: 0.1"),
+        ("{kp: 5.5, ki: 0.133333, kd: 39.375, Tf: 3.75}", "{kp: 5.6, ki: 0.133333, kd: 43.2, Tf: 3}"),
+    ):
+        assert old in card
+        card = card.replace(old, new)
+    (folder / "cards" / "fisher" / "provox.yaml").write_text(card, encoding="utf-8")
+
+
+PREPARE: dict[str, Callable[[Path], None]] = {"certificate.md": signed_certificate}
+"""By page: what else has to be put into the folder in which its commands run."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A command of a page, what the page says that it prints, and which parts of it the page shows (None: all)."""
+
+    page: Path
+    command: str
+    printed: str
+    parts: str | None
+
+    def today(self) -> str:
+        """Run the command in the current folder and return what the page has to show."""
+        printed = printed_by(self.command)
+        return printed if self.parts is None else shortened(printed, self.parts)
+
+
+def read(page: Path) -> str:
+    """Return the text of a page."""
+    return page.read_text(encoding="utf-8")
+
+
+def commands(page: Path) -> list[Shown]:
+    """Return the commands of a page."""
+    found = [Shown(page, m["command"], m["printed"], m["parts"]) for m in CONSOLE.finditer(read(page))]
+    assert len(found) == read(page).count("```console"), f"{page}: a console block holds one command, '$ pidemu ...'"
     return found
 
 
-def printed_by(command: str, folder: Path) -> str:
-    """Run a command and return what it prints on screen; files it writes go to `folder`."""
-    words = [w.replace("emulated.csv", str(folder / "emulated.csv")) for w in shlex.split(command)]
-    words = [str(ROOT / w) if w.startswith("examples/") else w for w in words]
-    result = CliRunner().invoke(cli, words)
-    return result.output.replace(f"{ROOT}{os.sep}", "")  # as in a clone's own folder
+def python_blocks(page: Path) -> list[str]:
+    """Return the blocks of code of a page."""
+    return _PYTHON.findall(read(page))
 
 
-def python_block(text: str) -> str:
-    """Return the Python example."""
-    (found,) = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
-    return str(found)
+def quotations(page: Path) -> list[tuple[str, str]]:
+    """Return path and text of each block that is a part of a file."""
+    return _PART.findall(read(page))
+
+
+def prepare(page: Path, folder: Path) -> None:
+    """Put the files that a page's commands and code read into a folder: the examples, and those that the page shows."""
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    for name, text in _FILE.findall(read(page)):
+        (folder / name).write_text(text, encoding="utf-8")
+    if page.name in PREPARE:
+        PREPARE[page.name](folder)
+
+
+def printed_by(command: str) -> str:
+    """Run a command without its ``pidemu`` in the current folder and return what it prints on screen."""
+    return CliRunner().invoke(cli, shlex.split(command), prog_name="pidemu", catch_exceptions=False).output
+
+
+def shortened(printed: str, parts: str) -> str:
+    """Return the parts of a printed text, with a mark for what is left out."""
+    lines, shown, done = printed.splitlines(), list[str](), 0
+    for part in parts.split("; "):
+        first, _, beyond = part.partition(" until ")
+        start = _line(lines, first, done)
+        end = _line(lines, beyond, start + 1)
+        shown = [*(_cut(shown) if start > done else shown), *lines[start:end]]
+        done = end
+    return "".join(f"{line}\n" for line in (_cut(shown) if done < len(lines) else shown))
+
+
+def _cut(shown: list[str]) -> list[str]:
+    """Return the lines, without empty ones at the end, and the mark."""
+    while shown and not shown[-1].strip():
+        shown = shown[:-1]
+    return [*shown, CUT]
+
+
+def _line(lines: list[str], begin: str, start: int) -> int:
+    """Return the number of the next line that begins so; of the next empty one, or the end, if `begin` is empty."""
+    for number, line in enumerate(lines[start:], start):
+        if line.strip().startswith(begin) if begin else not line.strip():
+            return number
+    assert not begin, f"no line begins with {begin!r} after line {start}"
+    return len(lines)
+
+
+def statements(block: str) -> list[tuple[str, str, bool]]:
+    """Return each statement of a block, what its comment says it gives, and whether it is an expression."""
+    lines = block.splitlines()
+    found = []
+    for node in ast.parse(block).body:
+        assert node.end_lineno is not None
+        code = "\n".join(lines[node.lineno - 1 : node.end_lineno])
+        comment = lines[node.end_lineno - 1].partition("  # ")[2]
+        found.append((code, comment, isinstance(node, ast.Expr)))
+    return found
+
+
+def run(block: str, names: dict[str, Any]) -> int:
+    """Run a block of code and hold the value of each expression against its comment; return how many there are.
+
+    The comment behind any other statement is prose.
+    """
+    checked = 0
+    for code, expected, is_expression in statements(block):
+        if not (is_expression and expected):
+            exec(code, names)
+            continue
+        assert eval(code.partition("  # ")[0], names) == ast.literal_eval(expected), code
+        checked += 1
+    return checked
+
+
+def renew(page: Path) -> None:
+    """Write what the commands of a page print today into it."""
+
+    def renewed(match: re.Match[str]) -> str:
+        return f"{match['head']}{Shown(page, match['command'], match['printed'], match['parts']).today()}```"
+
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        prepare(page, Path(folder))
+        text = CONSOLE.sub(renewed, read(page))
+    if text != read(page):
+        page.write_text(text, encoding="utf-8")
+        print(f"{page.relative_to(ROOT)}: renewed")
+
+
+def take_picture(width: int = 1000, highest: int = 3000) -> None:
+    """Take a picture of the first screen of the certificate, above its figures [pixels]."""
+    from PIL import Image, ImageChops
+
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if browser is None:
+        sys.exit("no Chromium found: install it, or leave --picture out")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        CliRunner().invoke(cli, [*shlex.split(PICTURED), "--html", "page.html"], catch_exceptions=False)
+        html = Path("page.html").read_text(encoding="utf-8")
+        Path("page.html").write_text(html[: html.index("<h2>Figures</h2>")], encoding="utf-8")
+        options = ["--headless", "--no-sandbox", "--hide-scrollbars", f"--window-size={width},{highest}", "--screenshot=page.png"]
+        subprocess.run([browser, *options, Path("page.html").resolve().as_uri()], check=True, capture_output=True)
+        with Image.open("page.png") as opened:
+            taken = opened.convert("RGB")
+    box = ImageChops.difference(taken, Image.new("RGB", taken.size, "white")).getbbox()
+    assert box is not None, "the page is empty"
+    taken.crop((0, 0, width, min(box[3] + 16, highest))).quantize(64).save(PICTURE, optimize=True)
+    print(f"{PICTURE.relative_to(ROOT)}: taken")
 
 
 def main() -> None:
-    """Write what the commands print today into the README."""
-    import tempfile
+    """Renew all pages and, where asked for, the picture."""
+    from tests.test_docs_conversion import write_tables  # it imports this module
 
-    text = README.read_text(encoding="utf-8")
-
-    def renewed(match: re.Match[str]) -> str:
-        command = match[1].partition("\n")[0]
-        with tempfile.TemporaryDirectory() as folder:
-            printed = printed_by(command.removeprefix("$ pidemu "), Path(folder))
-        return f"```console\n{command}\n{printed}```"
-
-    README.write_text(_BLOCK.sub(renewed, text), encoding="utf-8")
+    write_tables()
+    for page in PAGES:
+        renew(page)
+    if "--picture" in sys.argv[1:]:
+        take_picture()
 
 
 if __name__ == "__main__":

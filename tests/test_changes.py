@@ -306,7 +306,7 @@ def test_settings_that_make_no_controller_leave_everything_as_it_was() -> None:
     fields: dict[str, Any] = {"derivative": {"on": "error", "filter": {"applies-to": "term", "gain": "N"}}, "settings": dials}
     ctl, undisturbed = (bench(DEFAULTS | {"kd": 3.0, "N": 8.0}, **fields) for _ in range(2))
     before = ctl.settings
-    with pytest.raises(SettingError, match="a derivative gain of zero is no derivative"):
+    with pytest.raises(SettingError, match="a derivative gain of zero means no derivative"):
         ctl.change(N=0.0)
     assert_unmoved(ctl, undisturbed, before)
 

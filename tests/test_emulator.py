@@ -124,7 +124,7 @@ def test_a_scan_interval_that_is_no_positive_number_is_refused(scan: float) -> N
 
 @pytest.mark.parametrize("limits", [(100, 0), (5, 5), (math.nan, 100), (0, math.nan)])
 def test_limits_that_are_no_range_are_refused(limits: tuple[float, float]) -> None:
-    with pytest.raises(ScanError, match="are no range; give low, then high"):
+    with pytest.raises(ScanError, match="are not a range; give low, then high"):
         pidemu.Controller(pi(), output_limits=limits)
 
 

@@ -1,4 +1,4 @@
-"""Signals that are no numbers, and scans that come unevenly or not at all (card language, ``faults`` and ``scan.interval``)."""
+"""Signals that are not numbers, and scans that come unevenly or not at all (card language, ``faults`` and ``scan.interval``)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def bad(name: str, value: float) -> tuple[float, float]:
     return (value, 50.0) if name == "setpoint" else (52.0, value)
 
 
-# --- signals that are no numbers -------------------------------------------------------------------------------------
+# --- signals that are not numbers ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def step(settings: pidemu.Settings, limits: tuple[float, float] | None = None) -
 def test_one_degree_of_a_band_of_four_moves_a_heater_of_0_to_1_by_a_quarter(tmp_path: Path) -> None:
     s = card(tmp_path).settings(GAIN=4, RESET="off")
     assert step(s) == pytest.approx(0.25, rel=EXACT)
-    assert s.op_range == (0, 1)
+    assert s.op_range is not None and s.op_range.ends == (0, 1)
 
 
 @pytest.mark.parametrize(

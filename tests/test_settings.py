@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
@@ -334,3 +335,11 @@ def test_every_choice_of_options_of_every_card_has_settings(name: str) -> None:
     a_card = pidemu.load_card(name)
     for options in option_combinations(a_card):
         assert options == a_card.variant(options).chosen
+
+
+def test_settings_that_are_changed_are_still_executed_as_before() -> None:
+    declared = pidemu.load_card("allen-bradley/plc5").settings(EQUATION="ISA", KC=2, TI=1, TD=0.1)
+    run_too_often = replace(declared, pace=0.1, lag=2.0)
+    changed = run_too_often.changed({"DERIVATIVE": "error"})
+    assert (changed.pace, changed.lag) == (0.1, 2.0)
+    assert changed.law().feedback == run_too_often.law().feedback  # the option is about the setpoint only

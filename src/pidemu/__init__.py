@@ -14,10 +14,14 @@ if TYPE_CHECKING:
     from pidemu.card.load import Card
     from pidemu.comparison.compare import Comparison, compare
     from pidemu.conversion.convert import convert
+    from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
+    from pidemu.conversion.verify import Verification, verify
     from pidemu.emulator import Controller
     from pidemu.errors import (
+        ActionError,
         CardError,
+        CertificateError,
         ConversionRefusedError,
         EngineError,
         FleetError,
@@ -52,10 +56,16 @@ _HOMES = {
     "compare": "comparison.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "Verification": "conversion.verify",
+    "verify": "conversion.verify",
+    "Answer": "conversion.questions",
+    "Question": "conversion.questions",
     "Reading": "ambiguity.readings",
     "readings": "ambiguity.readings",
     "Controller": "emulator",
+    "ActionError": "errors",
     "CardError": "errors",
+    "CertificateError": "errors",
     "ConversionRefusedError": "errors",
     "EngineError": "errors",
     "FleetError": "errors",
@@ -84,8 +94,11 @@ _HOMES = {
 }
 
 __all__ = [
+    "ActionError",
+    "Answer",
     "Card",
     "CardError",
+    "CertificateError",
     "Comparison",
     "Controller",
     "Conversion",
@@ -102,6 +115,7 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "Question",
     "QuestionError",
     "Reading",
     "Record",
@@ -111,6 +125,7 @@ __all__ = [
     "Settings",
     "Simulation",
     "UnitError",
+    "Verification",
     "__version__",
     "cards",
     "compare",
@@ -121,6 +136,7 @@ __all__ = [
     "read_record",
     "readings",
     "simulate",
+    "verify",
 ]
 
 

@@ -183,7 +183,8 @@ def _filter(read: Reader, filt: Filter | None, rate: float, time: float, kp: flo
         gain = read.pick(filt.gain, math.inf)
         if gain == 0:
             raise SettingError(
-                f"{read.settings.card.id}: {filt.gain} is 0: a derivative gain of zero is no derivative; set the derivative to zero"
+                f"{read.settings.card.id}: {filt.gain} is 0: a derivative gain of zero means no derivative; "
+                "set the derivative to zero"
             )
         return base / gain, place, filt.order
     return base * read.pick(filt.ratio, 0.0), place, filt.order

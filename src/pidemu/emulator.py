@@ -31,7 +31,7 @@ def _pair(limits: Sequence[float]) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in limits)
     except (TypeError, ValueError):
-        raise ScanError(f"output limits {limits!r} are no pair of numbers such as (0, 100)") from None
+        raise ScanError(f"output limits {limits!r} are not a pair of numbers such as (0, 100)") from None
     return low, high
 
 

@@ -13,6 +13,7 @@
     ├── EngineError          a back end is not there, or cannot run what it is asked to
     ├── FleetError           a fleet of loops cannot be read or run as asked
     ├── RecordError          a recorded signal file cannot be used
+    ├── CertificateError     a file is not the certificate of a conversion, so that it cannot be verified
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
         └── QuestionError         what was given can mean several things, and the result depends on which; holds the questions
@@ -23,7 +24,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pidemu.conversion.questions import Question
@@ -130,6 +131,10 @@ class RecordError(PidemuError):
     """A file of recorded signals cannot be used."""
 
 
+class CertificateError(PidemuError):
+    """A file is not the certificate of a conversion, or not a whole one."""
+
+
 class ProcessError(PidemuError):
     """A process model cannot be one, or a controller cannot close a loop with it."""
 
@@ -151,6 +156,12 @@ class ConversionRefusedError(PidemuError):
         self.nearest = nearest
         self.alternatives = tuple(alternatives)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values, the form of ``pidemu convert --json``."""
+        from pidemu.conversion.document import refusal_document
+
+        return refusal_document(self)
+
 
 class QuestionError(ConversionRefusedError):
     """What was given can mean several things, and the result depends on which.
@@ -164,6 +175,12 @@ class QuestionError(ConversionRefusedError):
     def __init__(self, questions: Iterable[Question]) -> None:
         self.questions = tuple(questions)
         super().__init__("\n".join(q.text for q in self.questions))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values, the form of ``pidemu convert --json``."""
+        from pidemu.conversion.document import question_document
+
+        return question_document(self)
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

@@ -375,7 +375,7 @@ class Law:
         else:
             num = (0.0, *num)
         if len(_trim(num)) > 3 or len(_trim(den)) > 3:
-            raise UndefinedError("more than one filter is at work: the law has no five coefficients")
+            raise UndefinedError("more than one filter is at work: the law cannot be written with five coefficients")
         n0, n1, n2 = (*(x / den[0] for x in num), 0.0, 0.0, 0.0)[:3]
         d1, d2 = (*(x / den[0] for x in den[1:]), 0.0, 0.0)[:2]
         return n0, n1, n2, d1, d2

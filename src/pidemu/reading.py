@@ -80,7 +80,7 @@ def _unknown(card: Card, variant: Variant, name: str) -> str:
 
 
 def _implied(card: Card, options: Mapping[str, object], dials: Mapping[str, object], notes: list[str]) -> dict[str, object]:
-    """Choose an option nobody gave where the dials named exist under one of its choices only."""
+    """Choose an option that was not given where the dials named exist under one of its choices only."""
     chosen = dict(options)
     for name, option in card.data.options.items():
         if match_name(name, options):
@@ -206,6 +206,8 @@ def _check(value: Value, written: object) -> None:
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
-        raise SettingError(f"{shown} is infinite, and infinity is no off value here")
+        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
-        raise SettingError(f"{shown} would be infinite action; the smallest value above zero is meant, or another unit")
+        off = off_values(setting)
+        instead = f"{off[0]:g} switches it off" if off else "give the smallest value above zero, or another unit"
+        raise SettingError(f"{shown} would be infinite action; {instead}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from pidemu.algorithm import Algorithm, Lag
-from pidemu.card.load import Card, Statement, Variant
+from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
 from pidemu.ranges import PERCENT, SignalRange
 from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
@@ -206,28 +206,6 @@ class Settings(Mapping[str, Value]):
         """Return the active dial that sets `role`, or ``None``."""
         return next((v for v in self.values() if v.role is role and v.active), None)
 
-    def assumptions(self) -> list[Statement]:
-        """Return what the card only assumes and these settings rest on: fields of its equation, and options that nobody chose.
-
-        What is assumed of the derivative, or of a filter on a signal, does not count where it is off.
-        """
-        return self._at_work(self.variant.assumptions(self.defaulted))
-
-    def inferences(self) -> list[Statement]:
-        """Return what of the law's equation is only inferred, one statement per evidence entry."""
-        seen: dict[str, Statement] = {}
-        for s in self.variant.statements():
-            if s.is_inferred and s.makes_the_law and not s.path.startswith("settings"):
-                seen.setdefault(s.key, s)
-        return self._at_work(list(seen.values()))
-
-    def _at_work(self, found: list[Statement]) -> list[Statement]:
-        a = self.algorithm()
-        off: tuple[str, ...] = () if a.kd or a.Tf else ("derivative",)
-        off += () if a.sp_filter else ("setpoint.filter",)
-        off += () if a.pv_filter else ("measurement.filter",)
-        return [s for s in found if not s.path.startswith(off)] if off else found
-
     def changed(self, values: Mapping[str, object]) -> Settings:
         """Return these settings with some changed, by name; options as well.
 
@@ -243,7 +221,7 @@ class Settings(Mapping[str, Value]):
         given |= {n: c for n, c in self.options.items() if n.casefold() not in new and n not in self.defaulted}
         ranges = (("pv_range", self.pv_range), ("op_range", self.op_range))
         given |= {name: value for name, value in ranges if value is not None and name not in values}
-        return self.card.settings({**given, **values}).at_scan(self.scan)
+        return replace(self.card.settings({**given, **values}).at_scan(self.scan), pace=self.pace, lag=self.lag)
 
     def algorithm(self, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
         """Return the algorithm with its numbers.

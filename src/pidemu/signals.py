@@ -39,7 +39,7 @@ class Event:
     scan : int
         Which scan, counted from 0.
     kind : {"transfer", "settings", "signal", "interval"}
-        A change of mode, of settings, a signal that is no number, or a scan interval that is none.
+        A change of mode, of settings, a signal that is not a number, or a scan interval that is not positive.
     text : str
         What happened.
     bump : float

@@ -54,13 +54,13 @@ def seconds(text: str) -> float:
     Raises
     ------
     SettingError
-        It is no time.
+        It is not a time.
     """
     try:
         number, unit = parse_quantity(text.strip())
         return number if unit is None else to_canonical(Role.PROCESS_TIME, number, unit)
     except UnitError:
-        raise SettingError(f"'{text}' is no time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
+        raise SettingError(f"'{text}' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
 
 
 def step(text: str) -> float | tuple[float, float]:
@@ -75,4 +75,4 @@ def step(text: str) -> float | tuple[float, float]:
     try:
         return (seconds(when), float(size)) if comma else float(text)
     except (ValueError, SettingError):
-        raise SettingError(f"'{text}' is no step; write its size in %, such as 5, or when and its size, such as 60,5") from None
+        raise SettingError(f"'{text}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5") from None

@@ -214,7 +214,7 @@ def test_the_iec_example_bumps_at_the_transfer_to_manual_as_it_multiplies_the_op
     found = differences(settings("generic/standard", K=2, Ti=60), settings("iec/61131-3-pid", KP=-2, TR=60))["transfer"]
     assert found.figures[TO_MANUAL] == pytest.approx((0.0, (-2 - 1) * 50.0), abs=1e-4)
     assert "iec/61131-3-pid multiplies the operator's output by the gain" in found.text
-    assert "Switched to manual at the output that there is, it jumps by 0 % on the old controller and -150 % on" in found.text
+    assert "Switched to manual at its present output, it jumps by 0 % on the old controller and -150 % on" in found.text
 
 
 def test_an_integral_that_runs_on_in_manual_makes_the_output_jump() -> None:

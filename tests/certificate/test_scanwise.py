@@ -263,3 +263,8 @@ def test_without_emulation_the_certificate_has_none_and_gives_no_reason() -> Non
     c = pidemu.convert(PI, "generic/parallel", emulate=False).certificate
     assert (c.scan_by_scan, c.not_emulated, c.nonlinear, c.loop) == (None, "", (), None)
     assert c.verdict == "exact"
+
+
+def test_a_target_that_would_not_scan_once_is_not_run() -> None:
+    with pytest.raises(ScanError, match=r"^a scan interval of 1e\+09 s is longer than the whole record, "):
+        emulated(PI, PI, (1e-9, 1e9))

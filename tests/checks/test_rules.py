@@ -32,7 +32,7 @@ _UNITS = "1, %/%, %, eu, eu/eu, %/eu, Hz, " + ", ".join(
     f"{time}, {time}/repeat, repeat/{time}, 1/{time}, %/{time}, eu/{time}" for time in ("ms", "s", "min", "h")
 )
 _UNITS += "; also scan in place of a time, and degC, K, degF in place of eu"
-_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero is no derivative; set the derivative to zero"
+_ZERO_GAIN = "nobody/bench: ALPHA is 0: a derivative gain of zero means no derivative; set the derivative to zero"
 _FILTER_GAIN: tuple[Edit, ...] = (
     ("ratio: ALPHA", "gain: ALPHA"),
     (ALPHA, '  ALPHA: {sets: filter-gain, unit: "1", default: 0}\n'),
@@ -191,13 +191,13 @@ EQUATIONS: tuple[Case, ...] = (
         (f"23:39: unknown unit 'repeat' (did you mean 's/repeat'?); known units: {_UNITS}",),
     ),
     ("reject_bad_numbers", (("[0.05, 1]", "[1, 0.05]"),), ("17:49: range 1 to 0.05 does not ascend",)),
-    ("reject_bad_numbers", (("default: 0.125", "default: 2"),), ("17:69: default 2 is outside 0.05 to 1 and no off value",)),
+    ("reject_bad_numbers", (("default: 0.125", "default: 2"),), ("17:69: default 2 is outside 0.05 to 1 and is not an off value",)),
     ("reject_bad_numbers", (("default: 0.125", "default: .nan"),), ("17:69: default is not a number",)),
     ("reject_bad_numbers", (("[0, 100]", "[100, 0]"),), ("28:18: output limits 100 to 0 do not ascend",)),
     (
         "reject_bad_numbers",
         ((CHOICE, "{settings: {ALPHA: {range: [0.2, 1]}}}"),),
-        ("23:32: default 0.125 is outside 0.2 to 1 and no off value",),
+        ("23:32: default 0.125 is outside 0.2 to 1 and is not an off value",),
     ),
     ("reject_bad_numbers", ((CHOICE, "{output: {limits: [5, 1]}}"),), ("23:31: output limits 5 to 1 do not ascend",)),
     (

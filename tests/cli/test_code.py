@@ -157,7 +157,7 @@ def test_scan_interval_action_and_limits_are_in_the_c(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("--lang c --name 2nd", "error: '2nd' is no name in C; give letters, digits and single underscores, a letter first\n"),
+        ("--lang c --name 2nd", "error: '2nd' is not a name in C; give letters, digits and single underscores, a letter first\n"),
         ("--lang c --name double", "error: 'double' is a word of C or C++; give another name, such as double_control\n"),
         ("--name level", "--name names the file of a Python module; give --out as well\n"),
         ("--lang c --out taken/inside", "error: taken/inside/fisher_provox.h: cannot be written: Not a directory\n"),

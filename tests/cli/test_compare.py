@@ -172,11 +172,11 @@ def test_a_long_table_ends_with_how_many_more_there_are(folder: Path) -> None:
         ),
         (
             "generic/standard K=2 Ti=40 generic/standard K=2 Ti=40 --scan 1,fast",
-            "Invalid value for '--scan': '1,fast' is no scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
+            "Invalid value for '--scan': '1,fast' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
         ),
         (
             "generic/standard K=2 Ti=40 generic/standard K=2 Ti=40 --scan 0",
-            "Invalid value for '--scan': '0' is no scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
+            "Invalid value for '--scan': '0' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for one per card",
         ),
     ],
 )
@@ -196,7 +196,7 @@ def test_wrong_usage_is_said_with_the_usage_and_status_2(line: str, message: str
         ((*A, *B, "--record", "none.csv"), "none.csv: cannot be read: No such file or directory"),
         ((*A, *B, "-o", "nowhere/x.csv"), "nowhere/x.csv: cannot be written: No such file or directory"),
         ((*A, *B, "--plot", "x.pdf"), "x.pdf: pictures are written as .png or .svg; give the file such an ending"),
-        ((*A, *B, "--limits", "9,1"), "output limits 9 to 1 are no range; give low, then high"),
+        ((*A, *B, "--limits", "9,1"), "output limits 9 to 1 are not a range; give low, then high"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_message_with_status_2(words: tuple[str, ...], message: str) -> None:

@@ -222,7 +222,7 @@ def test_a_controller_without_integral_and_bias_is_noted(folder: Path) -> None:
     words = ("run", "fisher/provox", "GAIN=2", "RESET=off", "--scan", "1", "--record", "record.csv")
     off, *notes = noted(folder, "sp,pv\n50,45\n", *words)
     assert off.startswith("RESET: off is 0")
-    assert notes == ["there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"]
+    assert notes == ["without integral action the output in automatic is the terms alone, with a bias of 0; give --bias"]
     assert [n for n in noted(folder, "sp,pv\n50,45\n", *words, "--bias", "40") if "integral" in n] == []
 
 

@@ -28,7 +28,7 @@ The loop
   setpoint step  10 % at 18 s
   load step      10 % at 180 s
 
-What it did, errors from the load step on
+Result, errors from the load step on
 """
 
 
@@ -95,7 +95,7 @@ def test_steps_time_scan_and_limits_are_those_given() -> None:
 
 def test_without_a_load_step_errors_count_from_the_start() -> None:
     out = told(*WORDS, "--load", "0", "--setpoint", "0,5")
-    assert "What it did, errors from the start on" in out
+    assert "Result, errors from the start on" in out
     assert figure(out, "largest error") == 5
 
 
@@ -187,9 +187,9 @@ def test_what_cannot_be_run_is_said_with_status_2(words: tuple[str, str], messag
 
 USAGE = {
     ("--setpoint", "up"): (
-        "Invalid value for '--setpoint': 'up' is no step; write its size in %, such as 5, or when and its size, such as 60,5"
+        "Invalid value for '--setpoint': 'up' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
     ),
-    ("--time", "1 %"): "Invalid value for '--time': '1 %' is no time; write seconds, such as 0.5, or a unit too, such as 10 min",
+    ("--time", "1 %"): "Invalid value for '--time': '1 %' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min",
     ("--engine", "fortran"): "Invalid value for '--engine': 'fortran' is not one of 'auto', 'python', 'numpy', 'numba', 'c'.",
 }
 

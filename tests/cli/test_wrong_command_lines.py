@@ -22,7 +22,7 @@ _EXAMPLE = 'write for example GAIN=2 or "RESET=20 s/repeat"'
 _RANGE = 'is not a range; write low and high with a unit, such as "0,400 degC"'
 _ENDS = "is not a range; give two finite numbers, low before high"
 _NUMBER = 'is not a number, nor a number with a unit such as "20 s/repeat"'
-_SCAN = "is no scan interval; write seconds, such as 0.5, or 1,0.5 for source and target"
+_SCAN = "is not a scan interval; write seconds, such as 0.5, or 1,0.5 for source and target"
 _LISTS = "'pidemu cards' lists them"
 
 
@@ -90,14 +90,13 @@ SETTINGS = {
         "in 1/s; write 3 1/min if the gain is meant"
     ),
     f"convert fisher/provox GAIN=nan RESET=4 {_TO}": "fisher/provox: GAIN: is not a number (NaN)",
-    f"convert fisher/provox GAIN=inf RESET=4 {_TO}": "fisher/provox: GAIN: inf %/% is infinite, and infinity is no off value here",
+    f"convert fisher/provox GAIN=inf RESET=4 {_TO}": "fisher/provox: GAIN: "
+    "inf %/% is infinite, and infinity does not switch it off here",
     f"convert fisher/provox GAIN=2,5 RESET=4 {_TO}": "fisher/provox: GAIN: '2,5' has a comma; write a decimal point",
     f"convert fisher/provox GAIN=two RESET=4 {_TO}": f"fisher/provox: GAIN: 'two' {_NUMBER}",
     f"convert fisher/provox GAIN=-2 RESET=4 {_TO}": "fisher/provox: GAIN: -2 %/% is outside 0 to inf %/%",
     f"convert fisher/provox GAIN=off RESET=4 {_TO}": ("fisher/provox: GAIN: cannot be switched off: the card states no off value"),
-    f"convert generic/standard K=1 Ti=0 {_TO}": (
-        "generic/standard: Ti: 0 s would be infinite action; the smallest value above zero is meant, or another unit"
-    ),
+    f"convert generic/standard K=1 Ti=0 {_TO}": ("generic/standard: Ti: 0 s would be infinite action; inf switches it off"),
     f"convert honeywell/udc GAIN=2 RSET=80 {_TO}": ("honeywell/udc: RSET: 80 min/repeat is outside 0.02 to 50 min/repeat"),
     f"convert honeywell/udc GAIN=2 RSET=9000_s/repeat {_TO}": (
         "honeywell/udc: RSET: 150 min/repeat (given as 9000 s/repeat) is outside 0.02 to 50 min/repeat"
@@ -125,14 +124,14 @@ RUNS = {
     f"run {_PI} --record empty": "empty: cannot be read: Is a directory",
     f"run {_PI} --record good.csv --scan 0": "scan interval 0 s is not a positive number",
     f"run {_PI} --record good.csv --scan inf": "scan interval inf s is not a positive number",
-    f"run {_PI} --record good.csv --limits 100,0": "output limits 100 to 0 are no range; give low, then high",
+    f"run {_PI} --record good.csv --limits 100,0": "output limits 100 to 0 are not a range; give low, then high",
     f"run {_PI} --record good.csv --bias 3": ("a bias belongs to a positional controller without integral action; leave it out"),
     f"run {_PI} --record good.csv --initial-output nan": "the initial output nan is not a finite number",
     "run generic/standard K=2 Ti=off --record good.csv --bias nan": "the bias nan is not a finite number",
     f"run {_PI} --record good.csv -o nowhere/out.csv": "nowhere/out.csv: cannot be written: No such file or directory",
     f"run {_PI} --record good.csv -o empty": "empty: cannot be written: Is a directory",
     f"code {_PI} --scan -1": "scan interval -1 s is not a positive number",
-    f"code {_PI} --limits 3,1": "output limits 3 to 1 are no range; give low, then high",
+    f"code {_PI} --limits 3,1": "output limits 3 to 1 are not a range; give low, then high",
 }
 
 USAGE = {

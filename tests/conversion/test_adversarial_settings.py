@@ -271,7 +271,7 @@ COPIED = [
     ("modelica/limpid", {"k": 2}, "Ti", 0, "infinite action"),
     ("honeywell/udc", {"GAIN": 2}, "RSET", 0, "outside 0.02 to 50"),
     ("foxboro/pneumatic", {"PB": 50}, "INT", 0, "outside 0.01 to 50"),
-    ("fisher/provox", {"GAIN": 2}, "RESET", math.inf, "infinity is no off value here"),
+    ("fisher/provox", {"GAIN": 2}, "RESET", math.inf, "infinity does not switch it off"),
     ("toshiba/pid3", {"KP": 2}, "TI", math.inf, "outside 0 to 32.767"),
     ("automationdirect/directlogic", {"GAIN": 2}, "RESET", math.inf, "outside 0.01 to 99.98"),
     ("automationdirect/directlogic", {"GAIN": 2}, "RESET", 9999, "outside 0.01 to 99.98"),

@@ -99,23 +99,23 @@ WRONG = {
     "A,bailey/fc19,pv_range=5,gain=1,,,,,,": ("'5' is not a range; write low and high with a unit, such as \"0,400 degC\""),
     "A,generic/standard,K=2; Ti=10,lag=3,,,,,,": "'lag=3' has no gain; add gain=1.5, for example",
     "A,generic/standard,K=2; Ti=10,gain=1,fast,,,,,": (
-        "scan: 'fast' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+        "scan: 'fast' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min"
     ),
     'A,generic/standard,K=2; Ti=10,gain=1,"0,5",,,,,': (
-        "scan: '0,5' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+        "scan: '0,5' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,revers,,,,": (
         "action: 'revers' is neither reverse nor direct (did you mean 'reverse'?); leave the cell empty for negative feedback"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,100,,,": "limits: '100' is not two numbers such as 0,200",
     'A,generic/standard,K=2; Ti=10,gain=1,,,,"1,2,3",,': (
-        "setpoint: '1,2,3' is no step; write its size in %, such as 5, or when and its size, such as 60,5"
+        "setpoint: '1,2,3' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,,,5 %,": (
-        "load: '5 %' is no step; write its size in %, such as 5, or when and its size, such as 60,5"
+        "load: '5 %' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,,,,,,1 %": (
-        "time: '1 %' is no time; write seconds, such as 0.5, or a unit too, such as 10 min"
+        "time: '1 %' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min"
     ),
     "A,generic/standard,K=2; Ti=10,gain=1,lag=10,,,,,,": (
         "11 cells, the header has 10; put a cell that holds ',' in quotation marks"
@@ -124,7 +124,7 @@ WRONG = {
     'A,generic/standard,"K=2': ("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
 }
 
-WRONG["A" * 200_000] = "no row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
+WRONG["A" * 200_000] = "not a row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))

@@ -173,7 +173,7 @@ def test_stability_and_the_sign_of_the_feedback() -> None:
         (lambda: Process(1, [-1], [-2, -3]), "2 zeros and 1 poles.*add the small lags"),
         (lambda: Process.from_lags(1, [0]), "lag 0 s is not positive; leave out a lag of zero"),
         (lambda: Process.from_lags(1, [-5]), "lag -5 s is not positive.*give an unstable process its pole"),
-        (lambda: Process.from_lags(1, [5], [0]), "lead 0 s is none; leave it out"),
+        (lambda: Process.from_lags(1, [5], [0]), "a lead of 0 s does nothing; leave it out"),
         (lambda: Process.from_lags(1, integrators=-1), "integrators is -1; give how many"),
         (lambda: Process.from_lags(1, integrators=0.5), "integrators is 0.5; give how many"),  # type: ignore[arg-type]
         (lambda: Process(1, [-1]).sampled(0), "scan interval 0 s is not a positive number; give the time"),

@@ -97,7 +97,7 @@ def test_without_a_column_the_recorded_output_is_the_operator_s(tmp_path: Path) 
         ("sp,pv,cas\n1,2,on\n", ":2: column cas: 'on' is not a number"),
         ("sp,pv,hold\n1,2,maybe\n", ":2: column hold: 'maybe' is neither 1 (hold) nor 0 (no hold)"),
         ("sp,pv,auto\n1,2,\n", ":2: column auto: '' is neither 1 (automatic) nor 0 (manual)"),
-        ("sp,pv,dt\n1,2,nan\n", ":2: column dt: 'nan' is no interval; leave the cell empty for the nominal one"),
+        ("sp,pv,dt\n1,2,nan\n", ":2: column dt: 'nan' is not an interval; leave the cell empty for the nominal one"),
         ("sp,pv,cas,RSP\n1,2,3,4\n", ":1: columns cas, RSP all mean cascade; keep one"),
         (
             "t,sp,pv\n0,1,2\n2026-01-01,1,2\n",

@@ -259,9 +259,9 @@ def test_nothing_of_the_derivative_is_lost_to_rounding(seed: int) -> None:
 @pytest.mark.parametrize(
     ("a", "h", "message"),
     [
-        (replace(COUNTS, kp=1.505), 0.1, "the gain is no whole number of counts"),
-        (COUNTS, 0.00015, "the scan interval of 0.00015 s is no whole number of 0.0001 s"),
-        (replace(COUNTS, ki=1.5 / 60.00005), 0.1, "the integral time of 60.0001 s is no whole number"),
+        (replace(COUNTS, kp=1.505), 0.1, "the gain is not a whole number of counts"),
+        (COUNTS, 0.00015, "the scan interval of 0.00015 s is not a whole number of 0.0001 s"),
+        (replace(COUNTS, ki=1.5 / 60.00005), 0.1, "the integral time of 60.0001 s is not a whole number"),
         (replace(COUNTS, kp=1e15, ki=0.0), 0.1, "the gain is too large for whole numbers"),
         (replace(COUNTS, b=0.0), 0.1, "integer arithmetic is defined for velocity PID in standard form"),
         (replace(COUNTS, velocity=False, windup="none"), 0.1, "integer arithmetic is defined for velocity PID in standard form"),

@@ -153,7 +153,7 @@ def test_without_a_compiler_the_engine_says_what_to_install(folder: Path, monkey
 def test_a_compiler_that_is_named_and_not_there_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "nocc -m64")
     assert not native.available()
-    with pytest.raises(EngineError, match="there is no C compiler 'nocc', which the environment variable CC names"):
+    with pytest.raises(EngineError, match="the C compiler 'nocc', which the environment variable CC names, is not there"):
         native.runner(delaying((1, 1)))
 
 

@@ -1,1 +1,1 @@
-"""Settings of which nobody is sure what they mean."""
+"""Settings whose meaning is uncertain."""

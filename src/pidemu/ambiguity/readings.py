@@ -1,4 +1,4 @@
-"""Numbers whose meaning nobody is sure of: every way to read them, for the user to choose from.
+"""Numbers whose meaning is uncertain: every way to read them, for the user to choose from.
 
 A loop sheet says ``RESET 0.75``. Repeats per minute, or minutes per repeat? Naming a card answers that: its documentation states
 the units. Copied numbers have no such answer, so they are read in every way that makes sense, and nothing is chosen.
@@ -66,7 +66,7 @@ class Apart:
 def readings(
     word: str, values: Mapping[str, object] | None = None, /, *, vendors: Sequence[str | Path] = (), **named: object
 ) -> tuple[Reading, ...]:
-    """Return every way to read settings of which nobody is sure what they mean.
+    """Return every way to read settings whose meaning is uncertain.
 
     Open are, and combined with each other:
 

@@ -115,7 +115,7 @@ class Evidence(Model):
 
     status: Status = Field(
         description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
-        "from something documented) or `assumed` (nobody says so; shown wherever a result rests on it)."
+        "from something documented) or `assumed` (no source says so; shown wherever a result rests on it)."
     )
     source: Text | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
     at: Text | None = Field(

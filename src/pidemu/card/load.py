@@ -120,7 +120,7 @@ class Statement:
 
     @property
     def is_assumed(self) -> bool:
-        """Whether nobody says so."""
+        """Whether no source says so."""
         return self.evidence is not None and self.evidence.status is Status.ASSUMED
 
     @property
@@ -194,7 +194,7 @@ class Variant:
         Parameters
         ----------
         defaulted : iterable of str, optional
-            Options that nobody chose, so that their assumed defaults count as well; by default all.
+            Options that were not stated, so that their assumed defaults count as well; by default all.
         """
         seen: dict[str, Statement] = {}
         for name in self.chosen if defaulted is None else defaulted:
@@ -229,6 +229,11 @@ class Card:
 
     def __hash__(self) -> int:
         return hash(self.id)
+
+    @property
+    def digest(self) -> str:
+        """The card's version: SHA-256 of its file, in hexadecimal."""
+        return self.document.digest
 
     @property
     def title(self) -> str:

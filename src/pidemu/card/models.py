@@ -138,7 +138,7 @@ class Equation(Model):
     arithmetic: Arithmetic | None = Field(default=None, description="How numbers are computed; float64 if absent.")
     faults: Faults | None = Field(
         default=None,
-        description="What signals that are no numbers and scan intervals of zero or less do; nothing is computed "
+        description="What signals that are not numbers and scan intervals of zero or less do; nothing is computed "
         "and the output stands, if absent.",
     )
     settings: dict[SettingName, Setting] = Field(min_length=1, description="The dials, by the vendor's own names.")

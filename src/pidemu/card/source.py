@@ -6,6 +6,7 @@ the text, the answer is a document or a list of located problems.
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from dataclasses import dataclass, field
@@ -53,6 +54,8 @@ class Document:
         Plain dicts, lists and scalars.
     values, keys : dict
         Place of every value, and of every mapping key, by path.
+    digest : str
+        SHA-256 of the text, in hexadecimal; that of the file where its lines end in a line feed alone.
     """
 
     path: str
@@ -60,6 +63,7 @@ class Document:
     value: Any = None
     values: dict[Path_, Place] = field(default_factory=dict)
     keys: dict[Path_, Place] = field(default_factory=dict)
+    digest: str = ""
 
     def problem(self, path: Path_, message: str, *, at_key: bool = False) -> Problem:
         """Return a problem placed at `path`, or at the nearest enclosing thing that exists."""
@@ -164,9 +168,10 @@ def parse(text: str, path: str) -> Document:
     Raises
     ------
     CardError
-        The text is no YAML, is empty, or uses what cards do not: every problem found, with its place.
+        The text is not YAML, is empty, or uses what cards do not: every problem found, with its place.
     """
-    document = Document(path, tuple(text.splitlines()))
+    digest = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
+    document = Document(path, tuple(text.splitlines()), digest=digest)
     reader = _Reader(document)
     try:
         reader.events = iter(yaml.parse(text, Loader=_Loader))

@@ -134,7 +134,7 @@ def rounding_line(c: Certificate, digits: int | None) -> str:
     if before.is_exact:
         return f"{words}: within {percent(c.headline.loop_band.max_deviation)}"
     old, new = (percent(p.loop_band.max_deviation) for p in (before, c.headline))
-    return f"{words}: {new} instead of {old} in the loop band"
+    return f"{words}: {new} in the loop band, {'as before' if old == new else f'instead of {old}'}"
 
 
 def textbook_line(c: Conversion) -> str:

@@ -90,8 +90,8 @@ class LimitShift:
         if not self.permanent:
             return ""
         story = (
-            f"When PV moves by {self.error:.3g} %, so that the output stands at {self.limit:g} %, and comes back, the output of "
-            f"the old controller goes from {self.start:.4g} to {self.source:.4g} %, that of the new one to {self.target:.4g} %."
+            f"From an output of {self.start:.4g} %, PV moves by {self.error:.3g} %, so that the output stands at {self.limit:g} %, "
+            f"and comes back: then the old controller is at {self.source:.4g} %, the new one at {self.target:.4g} %."
         )
         if self.source_forgets and not self.target_forgets:
             return f"{story} Without integral action the old controller was shifted after every limit; the new one keeps its bias."

@@ -117,7 +117,7 @@ class ScanByScan:
     scan : tuple of float
         Scan intervals of source and target [s].
     taken : bool
-        Whether nobody gave these intervals, so that one was taken for both.
+        Whether no interval was given, so that one was taken for both.
     largest : float
         Largest difference of the two outputs [% of the output span].
     largest_at : float
@@ -354,7 +354,8 @@ class Certificate:
         moved = self.is_bent or contradicted or slow or coarse or self.shifts_for_good
         if moved or not self.feedback_is_exact:
             return "approximate"
-        same = self.setpoint_is_exact_in(mode) and "setpoint" not in {d.aspect for d in self.nonlinear}
+        limited = any(d.aspect == "setpoint" and d.figures for d in self.nonlinear)  # without figures it is about manual
+        same = self.setpoint_is_exact_in(mode) and not limited
         return "exact" if same else "exact-feedback"
 
     @property

@@ -113,7 +113,7 @@ def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan
             f"{_each(both, [STARTS[side.own.start] for side in both])}."
         )
     if abs(hand - new_hand) > least:
-        parts.append(f"Switched to manual at the output that there is, it jumps by {_jumps(to_manual)}.")
+        parts.append(f"Switched to manual at its present output, it jumps by {_jumps(to_manual)}.")
     manuals = [_MANUAL[side.own.manual_output] for side in both]
     if manuals[0] != manuals[1]:
         parts.append(f"In manual {both[0].name} {manuals[0]}, {both[1].name} {manuals[1]}.")

@@ -36,7 +36,7 @@ _TRIES: Final = 6
 
 
 def common_interval(source: Settings, target: Settings) -> float:
-    """Return a scan interval for both controllers where nobody gave any [s].
+    """Return a scan interval for both controllers where none was given [s].
 
     It is the source card's, made to suit the settings: between a 200th and a 20th of the effective integral time, and short enough
     for the filters of both. Where a dial counts in scans it is the interval at which that was read.
@@ -99,18 +99,20 @@ def emulated(
     factor : float
         What the source's gain is multiplied by for new signal ranges; negative where the action changes.
     taken : bool
-        Whether nobody gave these intervals.
+        Whether these intervals were taken, as none was given.
     in_cascade : bool
         Whether the setpoint is a remote one.
 
     Raises
     ------
     ScanError
-        A controller cannot be run at its interval.
+        A controller cannot be run at its interval, or scans so slowly that it would not scan once.
     """
     record = record_for(source, scans[0])
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
+    if not theirs_at.size:
+        raise ScanError(f"a scan interval of {scans[1]:g} s is longer than the whole record, {mine_at[-1]:.6g} s")
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
     actions = acting_alike(target, factor)
     mine, theirs = (_Bench(s, h, action, in_cascade) for s, h, action in zip((source, target), scans, actions, strict=True))

@@ -107,7 +107,9 @@ def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
         elif s.default is not None and math.isnan(s.default):
             yield document.problem((*home, "default"), "default is not a number")
         elif s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
-            yield document.problem((*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and no off value")
+            yield document.problem(
+                (*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and is not an off value"
+            )
     low, high = variant.equation.output.limits
     if not low < high:
         yield document.problem(variant.home(("output", "limits")), f"output limits {low:g} to {high:g} do not ascend")

@@ -20,6 +20,7 @@ _COMMANDS: Final = {
     "simulate": "Run a card in a closed loop with a process.",
     "fleet": "Run a file of closed loops, on all cores or on a cluster.",
     "matrix": "Convert typical settings of every card to every card.",
+    "verify": "Compute a signed certificate again, and say what changed.",
     "code": "Print the scan program of a card with its settings.",
 }
 

@@ -12,19 +12,30 @@ from pidemu.certificate.figures import (
     band_rows,
     decibels,
     degrees,
-    emulation_line,
-    kick_line,
     loop_rows,
-    other_units,
     percent,
     rounding_line,
-    textbook_line,
     unit_of,
 )
-from pidemu.certificate.models import EXACT, Certificate, LoopComparison
+from pidemu.certificate.models import EXACT, LoopComparison
 from pidemu.cli.common import heading, number, print_json, table, wrapped
+from pidemu.conversion.document import refusal_document
 from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.statement import (
+    bump_line,
+    chosen_line,
+    figure_lines,
+    lag_line,
+    neutral_line,
+    pace_line,
+    proof_lines,
+    ranges_line,
+    sections,
+    side_title,
+    source_rows,
+    target_rows,
+)
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 
@@ -36,16 +47,7 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     """Print why a target refuses, the nearest settings with their cost, and what could do instead."""
     nearest = error.nearest
     if as_json:
-        print_json(
-            {
-                "from": source.to_dict(),
-                "to": {"card": goal.id},
-                "verdict": "refused",
-                "reason": str(error),
-                "nearest": None if nearest is None else nearest.to_dict(),
-                "alternatives": list(error.alternatives),
-            }
-        )
+        print_json(refusal_document(error, {"from": source.to_dict(), "to": {"card": goal.id}}))
     click.echo(f"error: refused: {error}", err=True)
     if as_json:
         return
@@ -69,31 +71,16 @@ def print_conversion(c: Conversion) -> None:
     _target(c)
     heading("\nVerdict")
     wrapped(f"{c.verdict}: {c.sentence}", "  ")
-    _list("Other settings", tuple(f"{b.text}" + (f"  ({b.how})" if b.how else "") for b in c.beside))
-    _list("Conditions", tuple(condition_line(x) for x in c.conditions))
-    _list("At the loop", c.at_the_loop)
-    _list("Watch for", c.warnings)
-    _list("Read as", (*c.source.notes, *c.settings.notes))
-    heading("\nFigures")
-    _figures(c.certificate)
-    _textbook(c)
+    for title, items in sections(c):
+        _list(title, items)
+    _figures(c)
     if c.certificate.loop is not None:
         _loop(c.certificate.loop)
-    proof = c.certificate.proof
-    if proof is not None and proof.decided and proof.feedback_equal:
+    proof = proof_lines(c)
+    if proof:
         heading("\nProof")
-        for line in proof.text:
-            wrapped(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
-
-
-def condition_line(condition: object) -> str:
-    """Return a condition with its reason and its spread, in one line."""
-    from pidemu.conversion.conditions import Condition
-
-    assert isinstance(condition, Condition)
-    why = f": {condition.why}" if condition.why else ""
-    spread = f"; {condition.spread}" if condition.spread else ""
-    return f"{condition.text} ({condition.status}{why}){spread}"
+    for line in proof:
+        wrapped(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
 
 
 def print_plan(plan: TransferPlan) -> None:
@@ -102,13 +89,9 @@ def print_plan(plan: TransferPlan) -> None:
     wrapped(f"for {plan.action_text}", "  ")
     for i, step in enumerate(plan.steps, 1):
         wrapped(step.do, f"  {i}. ")
-    click.echo(f"  the output then moves by {_bump(plan.bump)} % of span; without this, by {_bump(plan.without_plan)} %")
+    click.echo(f"  {bump_line(plan)}")
     for note in plan.notes:
         wrapped(note, "  - ")
-
-
-def _bump(x: float) -> str:
-    return number(round(x, 9) + 0.0)
 
 
 def print_explanation(c: Conversion) -> None:
@@ -124,47 +107,26 @@ def _loop(loop: LoopComparison) -> None:
 
 
 def _side(title: str, s: Settings) -> None:
-    heading(f"\n{title}: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
-    rows = [
-        [name, number(v.value), unit_of(v), other_units(v), "" if v.given else "card's default"]
-        for name, v in s.items()
-        if v.active
-    ]
-    table(["", "", "", "", ""], rows, right=(1,))
-    if s.pace != 1:
-        click.echo(f"  executed at {number(s.pace)} times the interval it computes with: its times are that much longer")
-
-
-def _target(c: Conversion) -> None:
-    s, book = c.settings, c.textbook.settings
-    heading(f"\nTo: {s.card.title}" + (f"  [{s.variant.choice_text}]" if s.options else ""))
-    if c.chosen:
-        wrapped(
-            f"chosen automatically: {', '.join(f'{n}={x}' for n, x in c.chosen.items())} (--set to change, --explain for why)", "  "
-        )
-    rows = []
-    for name, v in s.items():
-        if v.active:
-            rule = number(book[name].value) if book is not None and name in book else "-"
-            rows.append([name, number(v.value), unit_of(v), other_units(v), rule])
-    table(["", f"{c.match} match", "", "", "textbook rule"], rows, right=(1, 4))
-    if s.lag:
-        click.echo(f"  in front of it, on PV: a first-order lag of {number(s.lag)} s")
-    line = rounding_line(c.certificate, c.request.digits)
-    if line:
+    heading(f"\n{title}: {side_title(s)}")
+    table(["", "", "", "", ""], [row.cells for row in source_rows(s)], right=(1,))
+    for line in filter(None, (ranges_line(s), pace_line(s))):
         wrapped(line, "  ")
 
 
-def _figures(c: Certificate) -> None:
-    table(BAND_COLUMNS, band_rows(c), right=(3, 4, 5))
-    if c.scan_by_scan is not None:
-        wrapped(emulation_line(c), "  ")
-    click.echo(f"  {kick_line(c)}")
+def _target(c: Conversion) -> None:
+    heading(f"\nTo: {side_title(c.settings)}")
+    if c.chosen:
+        wrapped(f"{chosen_line(c)} (--set to change, --explain for why)", "  ")
+    table(["", f"{c.match} match", "", "", "textbook rule"], [row.cells for row in target_rows(c)], right=(1, 4))
+    s = c.settings
+    for line in filter(None, (neutral_line(s), lag_line(s), ranges_line(s), rounding_line(c.certificate, c.request.digits))):
+        wrapped(line, "  ")
 
 
-def _textbook(c: Conversion) -> None:
-    line = textbook_line(c)
-    if line:
+def _figures(c: Conversion) -> None:
+    heading("\nFigures")
+    table(BAND_COLUMNS, band_rows(c.certificate), right=(3, 4, 5))
+    for line in figure_lines(c):
         wrapped(line, "  ")
 
 

@@ -21,7 +21,7 @@ from pidemu.unverified import facts, unverified_program
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
-@click.option("--name", metavar="NAME", help="What files, types and functions are called; by default after the card.")
+@click.option("--name", metavar="NAME", help="The name of files, types and functions; by default the card's.")
 @click.option("--out", type=click.Path(file_okay=False), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option

@@ -123,17 +123,17 @@ limits_option = click.option("--limits", type=Pair(), help="Output limits; by de
 setpoint_option = click.option(
     "--setpoint",
     type=Step(),
-    help="Setpoint step [%], or when [s] and size; by default 10 after a twentieth of the time. 0 for none.",
+    help="Size of the setpoint step [%], or its time [s] and size; by default 10 after a twentieth of the run. 0 for none.",
 )
 load_option = click.option(
     "--load",
     type=Step(),
-    help="Load step at the process input [%], or when [s] and size; by default 10 after half the time. 0 for none.",
+    help="Size of the load step at the process input [%], or its time [s] and size; by default 10 after half the run. 0 for none.",
 )
 engine_option = click.option(
     "--engine",
     type=click.Choice(["auto", *ENGINES]),
-    help="What runs it, and say so; all give the same numbers. By default, and with auto, the quickest.",
+    help="The engine that runs it, which is then named; all give the same numbers. By default, and with auto, the fastest.",
 )
 
 

@@ -52,7 +52,7 @@ class Scans(_ScansType):
             if not all(math.isfinite(x) and x > 0 for x in intervals):
                 raise ValueError
         except ValueError:
-            self.fail(f"'{value}' is no scan interval; write seconds, such as 0.5, or 1,0.5 for one per card", param, ctx)
+            self.fail(f"'{value}' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for one per card", param, ctx)
         return intervals
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
-from pidemu.cli.common import Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.common import Pair, Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
@@ -47,7 +49,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     "--from",
     "word",
     metavar="WORD",
-    help="Instead of CARD, where it is not sure what the numbers mean: every reading is shown, none is chosen.",
+    help="Instead of CARD, where it is uncertain what the numbers mean: every reading is shown, none is chosen.",
 )
 @click.option("--loop", "loop_file", metavar="FILE.yaml", help="Read source, settings and target from a file instead.")
 @click.option(
@@ -87,6 +89,8 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     show_default=True,
     help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
 )
+@click.option("--bias", type=float, help="Output at SP = PV of a loop without integral action [%].")
+@click.option("--limits", type=Pair(), help="Output limits that the source is set to: the answer states those of the target.")
 @click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
 @click.option("--pv-range", type=Range(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
 @click.option("--op-range", type=Range(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
@@ -100,6 +104,13 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     type=click.Choice(["reverse", "direct"]),
     help="Action of the loop. Reverse: the output falls when the measurement rises (error SP - PV). Needed where a cut-over "
     "depends on it; where the sign of the gain is the action it is known.",
+)
+@click.option(
+    "--date",
+    type=click.DateTime(["%Y-%m-%d"]),
+    callback=lambda _ctx, _option, moment: moment and moment.date(),
+    metavar="YYYY-MM-DD",
+    help="Date of the certificate; by default today.",
 )
 @click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
@@ -121,6 +132,8 @@ def command(
     assume: bool,
     allow_approximate: bool,
     digits: int,
+    bias: float | None,
+    limits: tuple[float, float] | None,
     tag: str,
     pv_range: SignalRange | None,
     op_range: SignalRange | None,
@@ -128,6 +141,7 @@ def command(
     to_op_range: SignalRange | None,
     now: str | None,
     action: str | None,
+    date: datetime.date | None,
     page: str | None,
     vendors: tuple[str, ...],
     as_json: bool,
@@ -166,8 +180,10 @@ def command(
     arguments: dict[str, Any] = {
         "options": options, "given": dials, "scan": scan, "runs_every": runs_every, "compensate": compensate, "mode": mode,
         "action": action, "match": match, "digits": digits, **to_ranges,
-        "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
+        "bias": bias, "limits": limits, "allow_approximate": allow_approximate, "assume": assume, "tag": tag,
     }  # fmt: skip
+    if loop is not None:
+        arguments |= {name: value for name, value in loop.others.items() if not _was_given(name)}
     if process is not None:
         from pidemu.loop.process import parse_process
 
@@ -181,14 +197,19 @@ def command(
     if page is not None:
         from pidemu.report.certificate import write_page
 
-        write_page(page, conversion, plan)
+        write_page(page, conversion, plan, date=date)
     if as_json:
-        print_json({**conversion.to_dict(), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
+        print_json({**conversion.to_dict(date), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
     else:
         _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:
         click.echo(f"error: {not_known}", err=True)
         raise SystemExit(1)
+
+
+def _was_given(name: str) -> bool:
+    """Whether an option stands on the command line, so that it counts before the loop file's."""
+    return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
 
 
 def _converted(source: Settings, goal: Card, arguments: dict[str, Any], as_json: bool) -> Conversion:

@@ -38,7 +38,7 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 
 @click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
 @click.argument("file", metavar="LOOPS.csv")
-@click.option("--time", type=Time(), help="How long, for loops that do not say; by default as long as each takes to settle.")
+@click.option("--time", type=Time(), help="Length of the run, for loops that state none; by default until each has settled.")
 @setpoint_option
 @load_option
 @engine_option

@@ -48,7 +48,7 @@ def command(
     """Convert typical settings of every CARD to every CARD, by default of all cards, and print verdicts and deviations.
 
     Typical settings are a gain of 2, 90 s of integral time and 10 s of derivative time; other dials are at the card's defaults. All
-    cards take about a minute. Exit status 1 if a conversion ends in an error that is no refusal.
+    cards take about a minute. Exit status 1 if a conversion ends in an error that is not a refusal.
     """
     if page is not None:
         from pidemu.report.matrix_page import check_page

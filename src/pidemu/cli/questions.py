@@ -5,8 +5,10 @@ from __future__ import annotations
 import click
 
 from pidemu.cli.common import number, print_json
+from pidemu.conversion.document import question_document
 from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.target import is_computed
 from pidemu.errors import QuestionError
 from pidemu.settings import Settings
 
@@ -15,7 +17,7 @@ def print_questions(error: QuestionError, source: Settings | None, goal: str, as
     """Print what has to be answered first: on stderr, with ``--json`` on stdout."""
     if as_json:
         known = {} if source is None else {"from": source.to_dict(), "to": {"card": goal}}
-        print_json({**known, "verdict": "question", "questions": [q.to_dict() for q in error.questions]})
+        print_json(question_document(error, known))
         click.echo(f"question: {error}", err=True)
         return
     for question in error.questions:
@@ -42,5 +44,9 @@ def _print(question: Question) -> None:
 def dials_line(c: Conversion) -> str:
     """Return a target's settings and options in one line."""
     s = c.settings
-    dials = [f"{name} = {number(v.value)} {v.unit}".removesuffix(" 1") for name, v in s.items() if v.active]
+    dials = [
+        f"{name} = {number(v.value)} {v.unit}".removesuffix(" 1")
+        for name, v in s.items()
+        if v.active and (is_computed(s.equation, name, v.role) or not v.off)
+    ]
     return f"{s.card.id}: {', '.join(dials)}" + (f" [{s.variant.choice_text}]" if s.options else "")

@@ -81,7 +81,8 @@ def _request_words(goal: Card, arguments: Mapping[str, Any]) -> list[str]:
     """Return what else was asked of the conversion as words of the command line."""
     asked = {
         "options": None, "given": None, "scan": None, "runs_every": None, "mode": "both", "action": None, "match": None,
-        "to_pv_range": None, "to_op_range": None, "process": None, "digits": None, "compensate": False,
+        "to_pv_range": None, "to_op_range": None, "process": None, "digits": None, "bias": None, "limits": None,
+        "compensate": False,
         "allow_approximate": False, "assume": False, "tag": "",
     }  # fmt: skip
     given = {n: x for n, x in arguments.items() if n in asked}

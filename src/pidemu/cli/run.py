@@ -39,7 +39,7 @@ from pidemu.scan.build import Action
     "file",
     required=True,
     metavar="FILE.csv",
-    help="Recorded signals: columns sp, pv and, if there are, time, auto, manual, output, cascade, track, external_reset, "
+    help="Recorded signals: columns sp, pv and optionally time, auto, manual, output, cascade, track, external_reset, "
     "feedforward, hold, interval.",
 )
 @click.option("--scan", type=float, metavar="H", help="Scan interval of record and controller [s]; by default the card's.")
@@ -56,7 +56,7 @@ from pidemu.scan.build import Action
     "--initial",
     multiple=True,
     metavar="NAME=VALUE",
-    help="What the controller holds before the first scan, by the names that 'pidemu code' shows, such as I=30. Repeatable.",
+    help="The controller's state before the first scan, by the names that 'pidemu code' shows, such as I=30. Repeatable.",
 )
 @click.option(
     "-o",
@@ -211,7 +211,7 @@ def _notes(
     for what in a.too_coarse(controller.interval):
         yield f"a scan interval of {number(controller.interval)} s is long for these settings: {what}"
     if not (a.ki or a.velocity or a.start == "load-output" or bias):
-        yield "there is no integral: in automatic the output is the terms alone, with a bias of 0; give --bias"
+        yield "without integral action the output in automatic is the terms alone, with a bias of 0; give --bias"
 
 
 def _initial(record: Record) -> float:

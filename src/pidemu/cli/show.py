@@ -181,7 +181,7 @@ def _evidence(variant: Variant) -> None:
     _sheet(rows, ["field", "status", "where it is stated, or why it is taken so"])
     assumed = variant.assumptions()
     if assumed:
-        heading("\nAssumed - nobody says so, and results rest on it")
+        heading("\nAssumed: no source states it, and results rest on it")
         for a in assumed:
             wrapped(str(a), "  - ")
 

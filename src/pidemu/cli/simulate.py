@@ -45,7 +45,7 @@ _NAMES: Final = {
     "travel": "travel of the output",
     "at_low": "at the low limit",
     "at_high": "at the high limit",
-    "swing": "error moves at the end over",
+    "swing": "range of the error at the end",
     "error": "last error",
 }
 _MARGINS: Final = {
@@ -75,7 +75,7 @@ _MARGINS: Final = {
 )
 @setpoint_option
 @load_option
-@click.option("--time", type=Time(), help="How long; by default long enough for both responses to settle.")
+@click.option("--time", type=Time(), help="Length of the run; by default long enough for both responses to settle.")
 @click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
 @click.option("--limits", type=Pair(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
 @engine_option
@@ -175,7 +175,7 @@ def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], mar
         *([] if choice is None else [["engine", str(choice)]]),
     ]
     table(["", ""], rows)
-    heading(f"\nWhat it did, errors from the {'start' if made.load_step is None else 'load step'} on")
+    heading(f"\nResult, errors from the {'start' if made.load_step is None else 'load step'} on")
     settled = "yes" if has_settled(figures["swing"], figures["peak"]) else "NO"
     rows = [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()]
     table(["", "", ""], [*rows, ["settled at the end", settled, ""]], right=(1,))

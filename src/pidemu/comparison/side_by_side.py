@@ -140,7 +140,7 @@ def run_on(
         seen = replace(seen, **gone)
     controller, biased = controller_for(settings, timing, action, limits, initial_output)
     if biased:
-        notes.append(f"{label}: there is no integral: the bias, its output at zero error, is {initial_output:g} %")
+        notes.append(f"{label}: without integral action its output at zero error is a bias, {initial_output:g} %")
     if action == "direct" and settings.equation.action.fixed:
         notes.append(f"{label}: there is no choice of action: the sign of the gain decides")
     notes += [f"{label}: {note}" for note in settings.notes]

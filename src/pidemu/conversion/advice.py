@@ -32,7 +32,11 @@ def warnings_for(c: Conversion) -> Iterator[str]:
         _lag(c),
         *_setpoint(c),
         noise_change(c.source, c.settings, c.scan, c.factor).text,
-        *(d.text for d in c.certificate.nonlinear if not d.inside_limits),
+        *(
+            d.text
+            for d in c.certificate.nonlinear
+            if not d.inside_limits and not (d.aspect == "bias" and c.request.bias is not None)
+        ),
         *_ranges(c),
         *_counted_in_scans(c),
         *_multiplier(c),

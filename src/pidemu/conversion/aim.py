@@ -38,7 +38,7 @@ def read_aim(text: str | None) -> Aim:
     Raises
     ------
     SettingError
-        There is no such match, or what stands behind the colon is no frequency.
+        There is no such match, or what stands behind the colon is not a frequency.
 
     Examples
     --------

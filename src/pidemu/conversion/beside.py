@@ -65,6 +65,8 @@ def runner_up(c: Conversion) -> Beside | None:
         if other.merit is None or other.settings is None or not _is_another(best.settings, other.settings):
             continue
         torn = best.merit.setpoint >= _TORN and other.merit.setpoint >= _TORN  # neither keeps the setpoint path
+        if other.merit.by_number and not best.merit.by_number:
+            continue
         same_class = RANK[other.verdict] <= RANK[best.verdict] and other.merit.setpoint == best.merit.setpoint
         if torn or (same_class and not other.merit.unused and other.merit.nonlinear == best.merit.nonlinear):
             return Beside("runner-up", _runner_up_text(best, other), other.settings, _set(best, other))
@@ -149,13 +151,10 @@ def _absorbed(c: Conversion) -> Iterator[Beside]:
     with suppress(PidemuError):
         request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
         found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
-        off = percent(found.certificate.feedback.loop_band.max_deviation)
-        yield Beside(
-            "absorbed",
-            f"without the lag, absorbed into the dials: {_dials(found.settings)}, {off}",
-            found.settings,
-            "--match low-frequency",
-        )
+        off = found.certificate.feedback.loop_band.max_deviation
+        if off < _FAR:
+            text = f"without the lag, absorbed into the dials: {_dials(found.settings)}, {percent(off)}"
+            yield Beside("absorbed", text, found.settings, "--match low-frequency")
 
 
 def _compensated(c: Conversion) -> Iterator[Beside]:

@@ -153,7 +153,8 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
         other = Form.SERIES if s.equation.form is Form.STANDARD else Form.STANDARD
         if s.equation.form is Form.PARALLEL:
             return ""
-        return _result(c, s, f"if it is {_FORMS[other]}", lambda e: e.model_copy(update={"form": other}), is_source=is_source)
+        found = _result(c, s, f"if it is {_FORMS[other]}", lambda e: e.model_copy(update={"form": other}), is_source=is_source)
+        return "; ".join(filter(None, (found, _bump_test(s, other) if is_source else "")))
     if statement.path == "derivative.filter.ratio":
         texts = [
             _result(c, s, f"with {ratio:g}", lambda e, r=ratio: _with_filter(e, ratio=r), is_source=is_source)  # type: ignore[misc]
@@ -169,6 +170,16 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
             is_source=is_source,
         )
     return ""
+
+
+def _bump_test(s: Settings, other: Form) -> str:
+    """Return the test on the old controller that tells two forms apart: what a PV step leaves beside the integral."""
+    varied = replace(s, variant=replace(s.variant, equation=s.equation.model_copy(update={"form": other})))
+    jumps = [_short(abs(x.law().moments()[1])) for x in (s, varied)]
+    return (
+        f"a bump test tells: once the derivative has died out, a PV step of 1 % has moved the old output by {jumps[0]} % "
+        f"({s.equation.form.value}) or {jumps[1]} % ({other.value}), besides the ramp"
+    )
 
 
 _FORMS: Final = {Form.SERIES: "interacting (series)", Form.STANDARD: "noninteracting (standard)"}

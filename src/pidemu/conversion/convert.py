@@ -61,6 +61,8 @@ def convert(
     process: Process | None = None,
     compensate: bool = False,
     digits: int | None = None,
+    bias: float | None = None,
+    limits: tuple[float, float] | None = None,
     allow_approximate: bool = False,
     assume: bool = False,
     emulate: bool = True,
@@ -106,6 +108,11 @@ def convert(
     digits : int, optional
         Round the dials to their resolution or, where the card states none, to so many significant digits: the certificate is about
         these numbers. By default they are not rounded.
+    bias : float, optional
+        Output of the old controller at SP = PV [% of the output span], for a loop without integral action; without it the answer
+        lists it as open.
+    limits : tuple of float, optional
+        Output limits that the source is set to [%, or the units that its card computes in]: the answer states those of the target.
     allow_approximate : bool
         Where the target refuses, return the nearest settings instead of raising.
     assume : bool
@@ -142,7 +149,8 @@ def convert(
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
-        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, compensate=compensate,
+        to_pv_range=to_pv_range, to_op_range=to_op_range, process=process, digits=digits, bias=bias, limits=limits,
+        compensate=compensate,
         allow_approximate=allow_approximate, assume=assume, tag=tag,
     )  # fmt: skip
     return converted(source, card, request, emulate=emulate)
@@ -153,8 +161,8 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     aim = _aim(request.match, request.process)
     _refuse_recursions(source, card)
     _refuse_absurd_gains(source)
-    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     opens = tuple(unstated(source))
+    source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]
     ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
     work = _Work(source, card, request, aim)
@@ -312,7 +320,7 @@ def _paced(source: Settings, request: Request) -> Settings:
 
 
 def _chosen(settings: Settings, request: Request) -> dict[str, str]:
-    """Return the options of the target that nobody stated and that are not as the card delivers them."""
+    """Return the options of the target that were not stated and are not as the card delivers them."""
     stated = {name.casefold() for name in request.options}
     delivered = settings.card.variant({}).chosen
     return {n: c for n, c in settings.options.items() if n.casefold() not in stated and c != delivered[n]}
@@ -353,7 +361,7 @@ def _refuse_absurd_gains(source: Settings) -> None:
     a = source.algorithm()
     for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
         if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: {gain:g} is no {name} gain that a controller has; check the settings")
+            raise SettingError(f"{source.card.id}: {gain:g} is not a {name} gain that a controller has; check the settings")
 
 
 def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from pidemu.certificate.figures import number, percent
@@ -35,8 +35,19 @@ class Explained:
 
 
 def explained(c: Conversion) -> tuple[Explained, ...]:
-    """Return every choice of the target's options that was looked at, the best first."""
-    return tuple(_explained(a, c.ranking[0]) for a in c.ranking)
+    """Return every choice of the target's options that was looked at, the best first; refusals for one reason are one."""
+    found = [_explained(a, c.ranking[0]) for a in c.ranking]
+    refused: dict[str, list[Explained]] = {}
+    for choice in found:
+        if choice.verdict == "refused":
+            refused.setdefault(choice.why, []).append(choice)
+    return (*(x for x in found if x.verdict != "refused"), *(_together(same) for same in refused.values()))
+
+
+def _together(same: list[Explained]) -> Explained:
+    """Return choices that are refused for the same reason as one."""
+    more = len(same) - 1
+    return replace(same[0], options=f"{same[0].options}, and {more} more" if more else same[0].options)
 
 
 def _explained(a: Attempt, best: Attempt) -> Explained:
@@ -47,5 +58,5 @@ def _explained(a: Attempt, best: Attempt) -> Explained:
     paths = (a.certificate.headline, a.certificate.setpoint_headline)
     off = [percent(p.loop_band.max_deviation) for p in paths]
     dials = ", ".join(f"{n} {number(float(f'{v.value:.4g}'))}" for n, v in a.settings.items() if v.active and v.given)
-    why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good; this one stands behind in the card"
+    why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good, but it comes later in the card"
     return Explained(options, a.verdict, off[0], off[1], dials, why)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -12,6 +13,8 @@ from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
+
+Interval = Number | Annotated[list[Number], Field(min_length=1, max_length=2)]
 
 
 class LoopFile(Model):
@@ -27,9 +30,12 @@ class LoopFile(Model):
     to_pv_range: Text | None = Field(default=None, description="Measurement range of the target: 0,1000 degF.")
     to_op_range: Text | None = Field(default=None, description="Output range of the target: 0,100 %.")
     process: Text | None = Field(default=None, description="The process, as `--process` takes it: gain=1.5,lag=10,delay=3.")
-    scan: Number | list[Number] | None = Field(
-        default=None, max_length=2, min_length=1, description="Scan interval of both, or of source and target [s]."
-    )
+    scan: Interval | None = Field(default=None, description="Scan interval of both, or of source and target [s].")
+    runs_every: Interval | None = Field(default=None, description="Interval at which the source, or both, are really executed [s].")
+    mode: Literal["auto", "cascade", "both"] | None = Field(default=None, description="Which setpoint counts.")
+    action: Literal["reverse", "direct"] | None = Field(default=None, description="Action of the loop.")
+    bias: Number | None = Field(default=None, description="Output at SP = PV of a loop without integral action [%].")
+    tag: Text | None = Field(default=None, description="The loop's name.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +54,8 @@ class Loop:
         The process.
     to_pv_range, to_op_range : str or None
         The target's ranges, as they are written.
+    others : dict
+        What else is given of the conversion's arguments: runs_every, mode, action, bias, tag.
     """
 
     card: str
@@ -58,6 +66,7 @@ class Loop:
     process: str | None = None
     to_pv_range: str | None = None
     to_op_range: str | None = None
+    others: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_loop(file: Path) -> Loop:
@@ -80,7 +89,20 @@ def read_loop(file: Path) -> Loop:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
-    intervals = loop.scan if isinstance(loop.scan, list) else [loop.scan] if loop.scan is not None else []
-    scan = None if not intervals else intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
     ranges = (loop.to_pv_range, loop.to_op_range)
-    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), scan, loop.process, *ranges)
+    given = {
+        "mode": loop.mode,
+        "action": loop.action,
+        "bias": loop.bias,
+        "tag": loop.tag,
+        "runs_every": _intervals(loop.runs_every),
+    }
+    others = {name: value for name, value in given.items() if value is not None}
+    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), _intervals(loop.scan), loop.process, *ranges, others)
+
+
+def _intervals(given: float | list[float] | None) -> float | tuple[float, float] | None:
+    """Return one scan interval or two [s]."""
+    if not isinstance(given, list):
+        return given
+    return given[0] if len(given) == 1 else (given[0], given[1])

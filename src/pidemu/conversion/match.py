@@ -218,7 +218,8 @@ def _series_roots(m0: float, m1: float, m2: float, filt: TargetFilter) -> Iterat
     if root < -_ROUNDING * linear * linear:
         has, needs = _apart(m1 * m1 / (m0 * m2), 4 * (1 + sigma))
         raise NoMatchError(
-            f"the source, with moments m1^2/(m0 m2) = {has}, has no equivalent in this series form, which needs {needs} or more"
+            f"as a standard form its integral time is {has} times its derivative time, and this series form with its filter needs "
+            f"{needs} times or more"
         )
     sum_ = linear + math.copysign(math.sqrt(max(root, 0.0)), linear)
     for D in (2 * m2 / sum_ if m2 else 0.0, sum_ / (2 * square) if m2 and square else None):

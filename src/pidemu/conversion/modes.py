@@ -23,7 +23,7 @@ def read_mode(mode: object) -> Modes:
     Raises
     ------
     SettingError
-        It is none of auto, cascade and both.
+        It is not one of auto, cascade and both.
     """
     found: Modes | None = next((m for m in CHOICES if m == mode), None)
     if found is None:

@@ -1,4 +1,4 @@
-"""A target's options, where nobody chose them: every choice tried, the best first (specs/equations.md, section 9)."""
+"""A target's options, where they were not stated: every choice tried, the best first (specs/equations.md, section 9)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def attempts(
     *,
     wanted: Mapping[str, object],
 ) -> tuple[Attempt, ...]:
-    """Return the attempts with every choice of the options that nobody chose, the best first.
+    """Return the attempts with every choice of the options that were not stated, the best first.
 
     Parameters
     ----------

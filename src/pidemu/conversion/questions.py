@@ -42,7 +42,7 @@ class Answer:
     says: str = ""
     given: Mapping[str, object] = field(default_factory=dict)
     asked: Mapping[str, object] = field(default_factory=dict)
-    conversion: Conversion | None = None
+    conversion: Conversion | None = field(default=None, repr=False)
     outcome: str = ""
     command: str = ""
     alike: tuple[str, ...] = ()

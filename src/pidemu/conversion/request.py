@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pidemu.action import read_action
 from pidemu.card.load import Card
@@ -43,6 +44,10 @@ class Request:
         The process.
     digits : int or None
         Digits to round to.
+    bias : float or None
+        Output at SP = PV of a loop without integral action [% of the output span], where it was stated.
+    limits : tuple of float or None
+        Output limits of the source, where they were stated [%, or the units that its card computes in].
     compensate, allow_approximate, assume : bool
         As in `convert`.
     """
@@ -58,6 +63,8 @@ class Request:
     to_op_range: SignalRange | None = None
     process: Process | None = None
     digits: int | None = None
+    bias: float | None = None
+    limits: tuple[float, float] | None = None
     compensate: bool = False
     allow_approximate: bool = False
     assume: bool = False
@@ -65,17 +72,47 @@ class Request:
 
     @property
     def declared(self) -> tuple[float, float] | None:
-        """The intervals that source and target compute with [s]."""
-        return None if self.scan is None else (self.scan[0] / self.pace[0], self.scan[1] / self.pace[1])
+        """The intervals that source and target compute with [s], to twelve digits."""
+        if self.scan is None:
+            return None
+        source, target = (float(f"{_ratio(h, pace):.12g}") for h, pace in zip(self.scan, self.pace, strict=True))
+        return source, target
+
+    @property
+    def runs_every(self) -> tuple[float, float] | None:
+        """The intervals at which both are executed, where these are others than those they compute with [s]."""
+        return self.scan if self.pace != (1.0, 1.0) else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was asked for as plain values for JSON, by the names of the arguments of `convert`."""
+        return {
+            "options": {n: str(x) for n, x in self.options.items()},
+            "given": {n: float(x) if isinstance(x, Real) else str(x) for n, x in self.given.items()},
+            "scan": self.declared and list(self.declared),
+            "runs_every": self.runs_every and list(self.runs_every),
+            "mode": self.mode,
+            "action": self.action,
+            "to_pv_range": self.to_pv_range and self.to_pv_range.argument,
+            "to_op_range": self.to_op_range and self.to_op_range.argument,
+            "match": self.match,
+            "process": self.process and written(self.process),
+            "compensate": self.compensate,
+            "digits": self.digits,
+            "bias": self.bias,
+            "limits": self.limits and list(self.limits),
+            "allow_approximate": self.allow_approximate,
+            "assume": self.assume,
+            "tag": self.tag,
+        }
 
     def words(self) -> Iterator[str]:
         """Yield what is asked for as words of ``pidemu convert``, to stand behind ``--to CARD``."""
         for name, value in {**self.options, **self.given}.items():
             yield from ("--set", f"{name}={exactly(value) if isinstance(value, float) else value}")
-        if self.scan is not None:
-            yield from ("--scan", _intervals(self.declared or self.scan))
-            if self.pace != (1.0, 1.0):
-                yield from ("--runs-every", _intervals(self.scan))
+        if self.declared is not None:
+            yield from ("--scan", _intervals(self.declared))
+        if self.runs_every is not None:
+            yield from ("--runs-every", _intervals(self.runs_every))
         if self.mode != "both":
             yield from ("--mode", self.mode)
         for name, given in zip(RANGES, (self.to_pv_range, self.to_op_range), strict=True):
@@ -89,18 +126,24 @@ class Request:
             yield from ("--process", written(self.process))
         if self.digits not in (None, DIGITS):
             yield from ("--digits", str(self.digits))
+        if self.bias is not None:
+            yield from ("--bias", exactly(self.bias))
+        if self.limits is not None:
+            yield f"--limits={','.join(map(exactly, self.limits))}"
         if self.tag:
             yield from ("--tag", self.tag)
         flags = {"--compensate": self.compensate, "--assume": self.assume, "--allow-approximate": self.allow_approximate}
         yield from (flag for flag, wanted in flags.items() if wanted)
 
 
+_SHORTEST, _LONGEST = 1e-9, 1e9
+"""Intervals beyond these are mistakes, and what is computed from them leaves the range of floating point [s]."""
 DIGITS = 5
 """Significant digits that the command line and the page print."""
 
 
-def _intervals(pair: tuple[float, ...]) -> str:
-    return ",".join(exactly(h) for h in dict.fromkeys(pair))
+def _intervals(both: tuple[float, ...]) -> str:
+    return ",".join(exactly(h) for h in dict.fromkeys(both))
 
 
 def read_request(
@@ -117,6 +160,8 @@ def read_request(
     to_op_range: object,
     process: Process | None,
     digits: object,
+    bias: float | None,
+    limits: tuple[float, float] | None,
     compensate: bool,
     allow_approximate: bool,
     assume: bool,
@@ -129,7 +174,7 @@ def read_request(
     Raises
     ------
     SettingError
-        A name comes twice, or a range, mode, action or number of digits is none.
+        A name comes twice, or a range, mode, action or number of digits cannot be read.
     ScanError
         A scan interval is not a positive number.
     """
@@ -155,6 +200,8 @@ def read_request(
         to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
+        bias=bias,
+        limits=limits,
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,
@@ -174,7 +221,12 @@ def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float]
     source = real[0] if declared is None else declared[0]
     target = declared[1] if declared is not None and len(declared) == 2 else real[0]
     target_real = real[1] if len(real) == 2 else target
-    return (real[0], target_real), (real[0] / source, target_real / target)
+    return (real[0], target_real), (_ratio(real[0], source), _ratio(target_real, target))
+
+
+def _ratio(real: float, declared: float) -> float:
+    """Return a quotient of two numbers as they were typed: 0.02 over 0.2 is 0.1."""
+    return float(Fraction(repr(real)) / Fraction(repr(declared)))
 
 
 def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
@@ -192,4 +244,6 @@ def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
         found = ()
     if not found or not all(math.isfinite(h) and h > 0 for h in found):
         raise ScanError(f"{name} is {given!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
+    if not all(_SHORTEST <= h <= _LONGEST for h in found):
+        raise ScanError(f"{name} is {given!r}; no controller is executed at such intervals, which are in seconds")
     return found

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pidemu.action import action_line, action_words, carried_action
 from pidemu.certificate.figures import number
@@ -16,17 +19,21 @@ from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
+from pidemu.conversion.document import provenance
 from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.plain import json_safe
+from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings
+from pidemu.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof
+    from pidemu.cutover.bench_check import BenchCheck
     from pidemu.cutover.plan import TransferPlan
     from pidemu.loop.process import Process
 
@@ -149,16 +156,35 @@ class Conversion:
         return f"{number(self.settings.lag)} s" if self.settings.lag else ""
 
     @cached_property
-    def at_the_loop(self) -> tuple[str, ...]:
-        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+    def bench_check(self) -> BenchCheck | ScanError:
+        """A check of the dials at the controller before the cut-over; the error where the target cannot be run for one."""
         from pidemu.cutover.bench_check import bench_check
 
-        lines = [f"Action: {self.action_text}." + self._old_action()]
         try:
-            lines.append(f"Bench check: {bench_check(self.settings, self.scan[1] if self.scan else None, self.action).text}")
+            return bench_check(self.settings, self.scan[1] if self.scan else None, self.action)
         except ScanError as error:
-            lines.append(f"No bench check: {error}.")
+            return error
+
+    @property
+    def at_the_loop(self) -> tuple[str, ...]:
+        """What to do at the loop: the action to set, and a check on the bench before the cut-over."""
+        lines = [f"Action: {self.action_text}." + self._old_action()]
+        if self.request.bias is not None and not self.settings.algorithm().ki:
+            lines.append(
+                f"Bias: set the output at SP = PV to {number(self.request.bias)} %, by the manual reset or bias of the new block."
+            )
+        if self.request.limits is not None:
+            lines.append(f"Output limits: {self._limits(self.request.limits)}.")
+        check = self.bench_check
+        lines.append(f"No bench check: {check}." if isinstance(check, ScanError) else f"Bench check: {check.text}")
         return tuple(lines)
+
+    def _limits(self, limits: tuple[float, float]) -> str:
+        """Return what the source's output limits are on the target, in words."""
+        old, new = (Scale(s) for s in (self.source, self.settings))
+        low, high = (number(new.output_own(float(old.output_percent(np.array(x))))) for x in limits)
+        unit = "%" if self.settings.equation.signals == "percent" else self.settings.own_ranges[1].unit or "output units"
+        return f"set {low} to {high} {unit}"
 
     @cached_property
     def command(self) -> str:
@@ -220,19 +246,29 @@ class Conversion:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What the result rests on without anybody having said so; what makes the law first."""
-        found = [(a, f"{s.card.id}: {a}") for s in (self.source, self.settings) for a in s.assumptions()]
-        law = [text for a, text in found if a.makes_the_law]
-        return tuple(dict.fromkeys(law + [text for a, text in found if not a.makes_the_law]))
+        """Every fact of the two cards that is assumed or inferred and at work at these settings; what makes the law first."""
+        both = (self.source, self.settings)
+        law = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_law(s))]
+        program = [f"{s.card.id}: {fact}" for s in both for fact in facts(unverified_program(s, scan=self.scan is not None))]
+        return tuple(dict.fromkeys(law + program))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, the form of ``pidemu convert --json``."""
+    def to_dict(self, date: datetime.date | None = None) -> dict[str, Any]:
+        """Return everything as plain values, the form of ``pidemu convert --json`` (specs/conversion.schema.json).
+
+        Parameters
+        ----------
+        date : datetime.date, optional
+            Date of the certificate; by default today.
+        """
+        check = self.bench_check
         plain = {
+            **provenance(self, date),
             "from": self.source.to_dict(),
             "to": self._target_dict(),
             "match": self.match,
             "verdict": self.verdict,
             "verdicts": self.verdicts,
+            "refusal": self.refusal,
             "sentence": self.sentence,
             "conditions": [c.to_dict() for c in self.conditions],
             "chosen": dict(self.chosen),
@@ -252,6 +288,8 @@ class Conversion:
             "warnings": list(self.warnings),
             "notes": [*self.source.notes, *self.settings.notes],
             "assumptions": list(self.assumptions),
+            "action": {"action": self.action, "text": self.action_text},
+            "bench_check": None if isinstance(check, ScanError) else asdict(check),
             "at_the_loop": list(self.at_the_loop),
             "command": self.command,
         }

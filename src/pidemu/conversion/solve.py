@@ -127,7 +127,7 @@ class Solver:
         return self._compensated(*self.forms.solve(aim.match), aim.match)
 
     def _default(self) -> tuple[Settings, Match]:
-        """Return the settings that nobody asked otherwise for (specs/equations.md, section 9, choices).
+        """Return the settings where no match is asked for (specs/equations.md, section 9, match).
 
         The same law where the target has it; else the source's own numbers where they are nearly that; else the same moments while
         these are near, and beyond that the least largest deviation.

@@ -29,9 +29,9 @@ def notes(bench: Bench, way: Way, cut: Cut) -> Iterator[str]:
         )
         yield f"{follows}; giving the setpoint back moves the output by {bench.out.percent(cut.kick):.6g} % of span in one scan"
     if cut.waited is None:
-        yield f"its filters and differences have not settled after {LONGEST} scans; the bump is that of then"
+        yield f"its filters and differences have not settled after {LONGEST} scans; the bump is the one at that moment"
     if bench.a.precision != "float64":
-        yield f"{bench.a.precision} arithmetic: {resolution(bench, cut):.2g} % of span is its rounding, and no bump"
+        yield f"{bench.a.precision} arithmetic: {resolution(bench, cut):.2g} % of span is its rounding, not a bump"
     ranges = (bench.settings.pv_range, bench.settings.op_range)
     if bench.settings.equation.signals == "engineering" and None in ranges:
         yield f"{card} computes in engineering units, and not all ranges were given: spans not given are taken as 100"

@@ -179,7 +179,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
     except csv.Error as error:
-        raise FleetError(f"no row of a CSV file ({error}); save the table as CSV text") from None
+        raise FleetError(f"not a row of a CSV file ({error}); save the table as CSV text") from None
 
 
 def _header(cells: Sequence[str]) -> list[str]:

@@ -74,7 +74,7 @@ def zeros_of(leads: Iterable[float]) -> list[complex]:
     zeros: list[complex] = []
     for lead in leads:
         if finite("lead", lead) == 0:
-            raise ProcessError("lead 0 s is none; leave it out")
+            raise ProcessError("a lead of 0 s does nothing; leave it out")
         zeros.append(-1 / lead)
     return zeros
 

@@ -104,7 +104,7 @@ def simulate(
     setpoint, load : float or tuple of float
         Size of a setpoint step, and of a load step that adds to the controller's output at the process [%]; or when [s] and size.
         By default after a twentieth of the time, and after half of it. They count from the first scan at or after that time; a size
-        of 0 is no step.
+        of 0 is not a step.
     time : float, optional
         How long [s]; by default long enough for both responses to settle, at most 50,000 scans.
     action : {"reverse", "direct"}, optional

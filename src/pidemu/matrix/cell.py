@@ -140,7 +140,7 @@ def cell(work: Work, source: str, target: str) -> Cell:
     Returns
     -------
     Cell
-        The outcome; an error that is no refusal gives the verdict ``failed``, with the error as sentence.
+        The outcome; an error that is not a refusal gives the verdict ``failed``, with the error as sentence.
     """
     try:
         return _converted(work, source, target)

@@ -85,7 +85,7 @@ class Record:
     def signals(self) -> dict[str, Floats]:
         """The signals beyond setpoint, measurement, mode and operator's output, by the name of the controller's argument.
 
-        A column that is empty throughout is no signal.
+        A column that is empty throughout is not a signal.
         """
         found = {name: getattr(self, name) for name in SIGNALS}
         return {name: x for name, x in found.items() if x is not None and not np.isnan(x).all()}
@@ -111,7 +111,7 @@ def read_record(path: str | Path) -> Record:
     Raises
     ------
     RecordError
-        The file cannot be read, lacks a column, or holds what is no number: with line and column name.
+        The file cannot be read, lacks a column, or holds what is not a number: with line and column name.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -167,7 +167,7 @@ def _cell(where: str, text: str, name: str) -> float:
             raise RecordError(f"{where}: '{text}' has a comma; write a decimal point") from None
         raise RecordError(f"{where}: '{text}' is not a number") from None
     if name == "interval" and math.isnan(value):
-        raise RecordError(f"{where}: '{text}' is no interval; leave the cell empty for the nominal one")
+        raise RecordError(f"{where}: '{text}' is not an interval; leave the cell empty for the nominal one")
     if name in SIGNALS and math.isinf(value):
         raise RecordError(f"{where}: '{text}' is not a finite number; leave the cell empty where there is no signal")
     return value

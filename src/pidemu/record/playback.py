@@ -137,7 +137,7 @@ def timing(record: Record, path: str | Path, given: float | None, settings: Sett
 
 
 def even_step(record: Record) -> float | None:
-    """Return the interval of a record with even steps [s], NaN where they are uneven, ``None`` where nobody says."""
+    """Return the interval of a record with even steps [s], NaN where they are uneven, ``None`` where it is not known."""
     steps, _ = _steps(record)
     step, uneven = _median(steps[1:] if steps.size > 1 else steps)
     return math.nan if uneven else step
@@ -155,7 +155,7 @@ def _median(steps: Floats) -> tuple[float | None, bool]:
 
 
 def _steps(record: Record) -> tuple[Floats, str]:
-    """Return the time since the last sample [s], NaN where nobody says, and the column it stands in."""
+    """Return the time since the last sample [s], NaN where it is not known, and the column it stands in."""
     if record.interval is not None:
         return record.interval, f"column {record.names.get('interval', 'interval')}"
     if record.time is None:

@@ -113,7 +113,7 @@ def sampled(record: Record, path: str | Path, scan: float | None, settings: Sett
     times = times_of(record, base, steps)
     between = np.diff(times)
     if not (np.isfinite(times).all() and (between > 0).all()):
-        raise RecordError(f"{path}: its time stands still or goes back; to be read every {scan:g} s it must go on with every line")
+        raise RecordError(f"{path}: its time does not increase from line to line, which it must to be read every {scan:g} s")
     end = times[-1] + (float(np.median(between)) if between.size else base)
     grid = times[0] + np.arange(math.ceil((end - times[0]) / scan - 1e-6)) * scan
     at = np.searchsorted(times, grid + 1e-6 * scan, side="right") - 1

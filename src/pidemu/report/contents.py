@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
+import datetime
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import pidemu
-from pidemu.certificate.figures import (
-    BAND_COLUMNS,
-    band_rows,
-    decibels,
-    degrees,
-    emulation_line,
-    kick_line,
-    loop_rows,
-    number,
-    other_units,
-    percent,
-    rounding_line,
-    textbook_line,
-    unit_of,
-)
+from pidemu.action import action_line
+from pidemu.certificate.figures import BAND_COLUMNS, band_rows, decibels, degrees, loop_rows, number, percent, rounding_line
 from pidemu.certificate.models import EXACT
+from pidemu.conversion.document import card_versions
 from pidemu.conversion.result import Conversion
+from pidemu.conversion.statement import (
+    MATCHES,
+    Row,
+    bump_line,
+    chosen_line,
+    figure_lines,
+    lag_line,
+    neutral_line,
+    pace_line,
+    proof_lines,
+    ranges_line,
+    sections,
+    source_rows,
+    target_rows,
+    unverified,
+)
+from pidemu.conversion.verify import SHORT
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
 from pidemu.plain import exactly
-from pidemu.ranges import SignalRange
-from pidemu.report.command import command_for
 from pidemu.report.curves import Who, bode, closed_loops, responses
 from pidemu.report.pictures import bode_picture, loops_picture, responses_picture
+from pidemu.settings import Settings
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 _VERDICTS: Final = {
     "exact": "Exact",
@@ -39,37 +47,14 @@ _VERDICTS: Final = {
     "approximate": "Approximate",
     "refused": "Only the nearest settings",
 }
-_MATCHES: Final = {
-    "exact": "the same law for measurement",
-    "low-frequency": "the same law at low frequencies, where the integral works",
-    "textbook": "by the rule in manuals",
-    "frequency": "the same gain and phase at one frequency",
-    "loop": "the load response of the loop changes least",
-    "constrained": "the largest deviation in the loop band is least",
+_MODES: Final = {
+    "auto": "automatic: the operator sets the setpoint",
+    "cascade": "cascade: another controller sets the setpoint",
+    "both": "automatic and cascade",
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Dial:
-    """A dial in print.
-
-    Attributes
-    ----------
-    name, text, unit, other, note : str
-        Its name, its value and unit, the value in the other usual unit, and where it is from.
-    exact : str
-        The value with all its digits.
-    textbook : str
-        What the textbook rule gives.
-    """
-
-    name: str
-    text: str
-    unit: str
-    other: str
-    exact: str
-    note: str = ""
-    textbook: str = ""
+_OPTION: Final = re.compile(r"(^|[\s(])(--[a-z][a-z-]*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +66,16 @@ class Picture:
     words: str
 
 
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One controller: its heading, its dials, and what else is set on it."""
+
+    id: str
+    title: str
+    rows: list[Row]
+    facts: list[tuple[str, str]]
+
+
 class Contents:
     """What the template prints.
 
@@ -90,17 +85,34 @@ class Contents:
         The conversion.
     plan : TransferPlan or None
         How to change over.
+    date : datetime.date
+        Date of the certificate.
     """
 
     version = pidemu.__version__
     band_columns = BAND_COLUMNS
+    exactly = staticmethod(exactly)
 
-    def __init__(self, conversion: Conversion, plan: TransferPlan | None) -> None:
+    def __init__(self, conversion: Conversion, plan: TransferPlan | None, date: datetime.date) -> None:
         self.c = conversion
         self.plan = plan
+        self.date = date.isoformat()
+        self.tag = conversion.request.tag
         self.certificate = conversion.certificate
+        self.cards = {card: digest[:SHORT] for card, digest in card_versions(conversion).items()}
+        self.sections = list(sections(conversion))
         self.bands = band_rows(self.certificate)
+        self.lines = figure_lines(conversion)
         self.loop = loop_rows(self.certificate.loop) if self.certificate.loop is not None else []
+        self.proof = proof_lines(conversion)
+        self.unverified = unverified(conversion)
+
+    @staticmethod
+    def whole(text: str) -> Markup:
+        """Return a text in which no option of the command line is broken at its hyphens."""
+        from markupsafe import Markup, escape
+
+        return Markup(_OPTION.sub(r'\1<span class="nb">\2</span>', str(escape(text))))
 
     @property
     def verdict(self) -> str:
@@ -113,89 +125,101 @@ class Contents:
         return _VERDICTS[self.verdict]
 
     @property
-    def source_dials(self) -> list[Dial]:
-        """Dials of the source that are in use."""
-        return [
-            Dial(n, number(v.value), unit_of(v), other_units(v), exactly(v.value), "" if v.given else "card's default")
-            for n, v in self.c.source.items()
-            if v.active
-        ]
+    def source(self) -> Side:
+        """The old controller as it was found, which is also the way back."""
+        s = self.c.source
+        return Side("source", s.card.title, source_rows(s), list(self._facts(s, 0, action_line(s, self.c.action))))
 
     @property
-    def target_dials(self) -> list[Dial]:
-        """Dials of the target that are in use."""
-        book = self.c.textbook.settings
-        return [
-            Dial(
-                n, number(v.value), unit_of(v), other_units(v), exactly(v.value),
-                textbook=number(book[n].value) if book is not None and n in book and book[n].active else "-",
-            )
-            for n, v in self.c.settings.items()
-            if v.active
-        ]  # fmt: skip
+    def target(self) -> Side:
+        """The new controller."""
+        s = self.c.settings
+        facts = list(self._facts(s, 1, self.c.action_text))
+        rounding = rounding_line(self.certificate, self.c.request.digits)
+        neutral = neutral_line(s).removeprefix("neutral, to be set so: ")
+        extra = [(title, text) for title, text in (("neutral, to be set so", neutral), ("rounding", rounding)) if text]
+        return Side("target", s.card.title, target_rows(self.c), [*facts, *extra])
+
+    def _facts(self, s: Settings, side: int, action: str) -> Iterator[tuple[str, str]]:
+        scans, real = self.c.request.declared, self.c.request.runs_every
+        if s.options:
+            yield "options", ", ".join(f"{n}={x}{self._how(side, n)}" for n, x in s.options.items())
+        if lag_line(s):
+            yield "filter", lag_line(s)
+        yield "action", action
+        yield "ranges", ranges_line(s).removeprefix("ranges: ") or "not given"
+        scan = "not given" if scans is None else f"{number(scans[side])} s"
+        executed = f", executed every {number(real[side])} s" if real is not None and scans is not None else ""
+        yield "scan", scan + executed + (f"; {pace_line(s)}" if pace_line(s) else "")
+
+    def _how(self, side: int, option: str) -> str:
+        """Return how an option came about, where it was not stated."""
+        if side == 0:
+            return " (not stated)" if option in self.c.source.defaulted else ""
+        return " (chosen automatically)" if option in self.c.chosen else ""
+
+    def as_found(self, row: Row) -> str:
+        """Return how a dial of the source was written, where that is not its value in the card's unit."""
+        typed = row.dial.typed
+        if not isinstance(typed, str) or typed.split()[0] in (row.value, exactly(row.dial.value)):
+            return ""
+        try:
+            return "" if float(typed) == row.dial.value else f"found as {typed}"
+        except ValueError:
+            return f"found as {typed}"
 
     @property
     def rounded(self) -> list[tuple[str, str, str]]:
         """Dials that were rounded: name, before, after."""
-        return [(d.name, number(d.exact), number(d.rounded)) for d in self.certificate.dials]
+        return [(d.name, f"{d.exact:.8g}", number(d.rounded)) for d in self.certificate.dials]
 
     @property
-    def lines(self) -> list[str]:
-        """What stands below the figures."""
-        c = self.certificate
-        return [line for line in (emulation_line(c), kick_line(c), rounding_line(c), textbook_line(self.c)) if line]
-
-    @property
-    def choices(self) -> Iterator[tuple[str, str]]:
-        """How the settings came about."""
-        c = self.c
-        yield "match", f"{c.match}: {_MATCHES[c.match]}"
-        for who, s in (("before", c.source), ("after", c.settings)):
-            if s.options:
-                yield f"options {who}", s.variant.choice_text
+    def given(self) -> Iterator[tuple[str, str]]:
+        """What was given, and what was chosen."""
+        c, request = self.c, self.c.request
+        yield "given, before", self._given_of_the_source()
+        asked = {**request.options, **request.given}
+        yield "given, after", ", ".join(f"{n}={x}" for n, x in asked.items()) or "nothing but the card"
         if c.chosen:
-            yield "chosen", f"{', '.join(f'{n}={x}' for n, x in c.chosen.items())}, as nobody said otherwise"
+            yield "chosen", chosen_line(c)
+        yield "match", f"{c.match}: {MATCHES[c.match]}" + ("" if request.match is None else ", as asked for")
+        yield "mode", _MODES[request.mode] + (", as nothing was stated" if request.mode == "both" else "")
+        by = "as stated" if request.action else "by the sign of the gain"
+        yield "action", "not stated" if c.action is None else f"{c.action}, {by}"
         yield "scan interval", self._scans()
-        for what, before, after in (
-            ("measurement range", c.source.pv_range, c.settings.pv_range), ("output range", c.source.op_range, c.settings.op_range),
-        ):  # fmt: skip
-            if before or after:
-                yield what, f"{_range(before)} before, {_range(after)} after"
+        if request.bias is not None:
+            yield "bias", f"{number(request.bias)} % at SP = PV"
         if c.factor != 1:
             yield "gain", f"multiplied by {number(c.factor)} for the new ranges or the new action"
-        if c.process is not None:
-            yield "process", c.process.text
+        yield "process", "not given" if c.process is None else c.process.text
         band = self.certificate.headline.loop_band
-        yield "loop band", f"{band.low:.3g} to {band.high:.3g} rad/s: where the loop works"
+        yield "loop band", f"{band.low:.3g} to {band.high:.3g} rad/s: where the crossover of a loop usually lies"
+
+    def _given_of_the_source(self) -> str:
+        s = self.c.source
+        dials = [f"{n}={v.typed if isinstance(v.typed, str) else number(v.value)}" for n, v in s.items() if v.given]
+        options = [f"{n}={x}" for n, x in s.options.items() if n not in s.defaulted]
+        taken = [f"{n}={x}" for n, x in s.options.items() if n in s.defaulted]
+        defaults = [f"{n}={number(v.value)}" for n, v in s.items() if v.active and not v.given]
+        rest = f"; not given, so as the card delivers them: {', '.join([*taken, *defaults])}" if taken or defaults else ""
+        return f"{', '.join([*dials, *options])}{rest}"
 
     def _scans(self) -> str:
         scan, emulated = self.c.scan, self.certificate.scan_by_scan
         if scan is not None:
-            return f"{number(scan[0])} s before, {number(scan[1])} s after"
+            how = "make up for" if self.certificate.compensated else "do not depend on"
+            return f"{number(scan[0])} s before, {number(scan[1])} s after; the settings {how} them"
         return f"not given; {number(emulated.scan[0])} s taken to run both" if emulated is not None else "not given"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """How the numbers were read."""
-        return (*self.c.source.notes, *self.c.settings.notes)
-
-    @property
-    def assumed(self) -> list[str]:
-        """What the settings rest on without anybody having said so."""
-        others = len(self.c.assumptions) - len(self.c.law_assumptions)
-        what = "1 more assumption concerns" if others == 1 else f"{others} more assumptions concern"
-        more = f"{what} scan rules, limits and transfers: 'pidemu show' and --json list them"
-        return [*self.c.law_assumptions, *([more] if others else [])]
 
     @property
     def bump(self) -> str:
         """What the cut-over does to the output."""
         assert self.plan is not None
-        return f"the output then moves by {number(self.plan.bump)} % of span; without this, by {number(self.plan.without_plan)} %"
+        return bump_line(self.plan)
 
     @property
     def not_covered(self) -> Iterator[str]:
-        """What nobody should take this page for."""
+        """What this page does not say."""
         if self.c.process is None:
             yield "the process: none was given, so that margins and loop responses before and after are not known (--process)"
         else:
@@ -209,11 +233,6 @@ class Contents:
             "range, cascades, feedforward, interlocks, alarms"
         )
         yield "another firmware or other options; whether what was read off the old controller is what it ran with"
-
-    @cached_property
-    def command(self) -> str:
-        """The command that makes the conversion again."""
-        return command_for(self.c)
 
     @property
     def names(self) -> dict[Who, str]:
@@ -235,7 +254,8 @@ class Contents:
             yield self._loops()
 
     def _bode(self) -> Picture:
-        found, band = bode(self.c), self.certificate.headline.loop_band
+        found, c = bode(self.c), self.certificate
+        band = (c.feedback_at_scan or c.feedback).loop_band
         apart = f"differ by up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)}"
         how = "at the scan intervals, held from scan to scan" if self.c.scan else "continuous"
         return Picture(
@@ -264,10 +284,6 @@ class Contents:
             f"A setpoint step and a load step at the process input, of {number(found.size)} % each, both controllers emulated "
             f"every {_intervals(found.scan)} s, without output limits.",
         )
-
-
-def _range(given: SignalRange | None) -> str:
-    return str(given) if given else "not given"
 
 
 def _intervals(scans: tuple[float, float]) -> str:

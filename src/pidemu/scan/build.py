@@ -102,7 +102,7 @@ def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, ini
             raise ScanError(f"the {name} {value:g} is not a finite number")
     low, high = limits
     if not low < high:
-        raise ScanError(f"output limits {low:g} to {high:g} are no range; give low, then high")
+        raise ScanError(f"output limits {low:g} to {high:g} are not a range; give low, then high")
     if bias and (a.ki or a.velocity):
         raise ScanError("a bias belongs to a positional controller without integral action; leave it out")
     if a.windup == "external-reset" and a.integral_rule is Rule.TRAPEZOIDAL and a.ki:

@@ -36,7 +36,7 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     Raises
     ------
     ScanError
-        The algorithm is not of this kind, or the scan interval is no whole number of ticks.
+        The algorithm is not of this kind, or the scan interval is not a whole number of ticks.
     """
     if not a.velocity or a.series or a.c != 0 or a.b != 1 or a.integral_rule is not Rule.BACKWARD or a.shape is not None:
         raise ScanError("integer arithmetic is defined for velocity PID in standard form, P on error and D on the measurement")
@@ -66,13 +66,13 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
 def _ticks(seconds: float, what: str) -> int:
     ticks = Fraction(seconds).limit_denominator(10**7) * _TICKS
     if abs(ticks - round(ticks)) > Fraction(1, 1000):
-        raise ScanError(f"the {what} of {seconds:g} s is no whole number of {1 / _TICKS:g} s, which integer arithmetic counts in")
+        raise ScanError(f"the {what} of {seconds:g} s is not a whole number of {1 / _TICKS:g} s, the step of integer arithmetic")
     return round(ticks)
 
 
 def _whole(value: float, what: str) -> float:
     if abs(value - round(value)) > 1e-6:
-        raise ScanError(f"the {what} is no whole number of counts, {value:g}; give it in the steps of the card's dial")
+        raise ScanError(f"the {what} is not a whole number of counts, {value:g}; give it in the steps of the card's dial")
     if abs(value) >= _LARGEST:
         raise ScanError(f"the {what} is too large for whole numbers")
     return float(round(value))

@@ -66,7 +66,7 @@ def header(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     Raises
     ------
     EngineError
-        The name is no C identifier.
+        The name is not a C identifier.
     """
     unit = _unit(program, name)
     guard = f"{name.upper()}_H"
@@ -85,7 +85,7 @@ def source(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     Raises
     ------
     EngineError
-        The name is no C identifier.
+        The name is not a C identifier.
     """
     unit = _unit(program, name)
     return _joined([_about(unit, notes), f'#include "{name}.h"', *_preamble(unit), *_functions(unit)])
@@ -102,7 +102,7 @@ def single(program: Program, name: str, notes: Sequence[str] = ()) -> str:
     Raises
     ------
     EngineError
-        The name is no C identifier.
+        The name is not a C identifier.
     """
     unit = _unit(program, name)
     return _joined([_about(unit, notes), "#include <stddef.h>", *_preamble(unit), types(unit), prototypes(unit), *_functions(unit)])
@@ -130,10 +130,10 @@ def check_name(name: str) -> None:
     Raises
     ------
     EngineError
-        It is no C identifier, or one that C or C++ keeps for itself.
+        It is not a C identifier, or one that C or C++ keeps for itself.
     """
     if not re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name):
-        raise EngineError(f"'{name}' is no name in C; give letters, digits and single underscores, a letter first")
+        raise EngineError(f"'{name}' is not a name in C; give letters, digits and single underscores, a letter first")
     if name in RESERVED:
         raise EngineError(f"'{name}' is a word of C or C++; give another name, such as {name}_control")
 

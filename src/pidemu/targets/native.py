@@ -45,7 +45,7 @@ def compiler() -> tuple[str, ...]:
     if chosen:
         if shutil.which(chosen[0]) is None:
             raise EngineError(
-                f"there is no C compiler '{chosen[0]}', which the environment variable CC names; name one that there is"
+                f"the C compiler '{chosen[0]}', which the environment variable CC names, is not there; name one that is installed"
             )
         return tuple(chosen)
     found = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)

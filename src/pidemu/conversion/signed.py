@@ -1,0 +1,150 @@
+"""A certificate in a file, as ``pidemu convert --json`` wrote it: read and checked, whatever the file holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+import pidemu
+from pidemu.conversion.document import SCHEMA
+from pidemu.conversion.schema import ActionPart, Asked, BenchCheckPart, ConditionPart, Day, Name, Sha256, Target
+from pidemu.errors import CertificateError
+
+LARGEST: Final = 16 * 2**20
+"""Size of a file beyond which it is not read [bytes]; a certificate has some 50 kB."""
+_AGAIN: Final = "write the certificate again with 'pidemu convert ... --json'"
+
+
+class Signed(BaseModel):
+    """What a certificate is verified by; what else it holds follows from that, or is wording."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, frozen=True, defer_build=True)
+
+    pidemu: Name
+    date: Day
+    cards: dict[Name, Sha256]
+    request: Asked
+    to: Target
+    verdict: Name
+    refusal: str
+    conditions: list[ConditionPart]
+    action: ActionPart
+    bench_check: BenchCheckPart | None
+    figures: dict[str, Any] = Field(alias="certificate")
+
+
+def read_signed(source: str | Path | Mapping[str, Any]) -> tuple[str, Signed]:
+    """Return a certificate with what to call it in messages.
+
+    Parameters
+    ----------
+    source : str, path or mapping
+        The file, or what it holds.
+
+    Raises
+    ------
+    CertificateError
+        The file cannot be read, is not a certificate or not a whole one, or has another form.
+    """
+    if isinstance(source, Mapping):
+        return "certificate", _checked("certificate", dict(source))
+    name = str(source)
+    return name, _checked(name, _parsed(name, _text(name)))
+
+
+def _text(name: str) -> str:
+    try:
+        with Path(name).open("rb") as file:
+            found = file.read(LARGEST + 1)
+    except (OSError, ValueError) as error:  # a name with a null character is a ValueError
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise CertificateError(f"{name}: cannot be read: {reason}") from None
+    if len(found) > LARGEST:
+        raise CertificateError(
+            f"{name}: larger than {LARGEST // 2**20} MB, which no certificate is; name the file of one conversion"
+        )
+    try:
+        return found.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = found[: error.start].count(b"\n") + 1
+        raise CertificateError(f"{name}:{line}: not UTF-8 text, so not a certificate; {_AGAIN}") from None
+
+
+def _parsed(name: str, text: str) -> Any:
+    if not text.strip():
+        raise CertificateError(f"{name}: the file is empty; {_AGAIN}")
+    try:
+        return json.loads(text, parse_constant=_refuse, object_pairs_hook=_once)
+    except json.JSONDecodeError as error:
+        cut = error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated")
+        what = "the file ends in the middle" if cut else f"not JSON: {error.msg[0].lower()}{error.msg[1:]}"
+        raise CertificateError(f"{name}:{error.lineno}:{error.colno}: {what}; {_AGAIN}") from None
+    except RecursionError:
+        raise CertificateError(f"{name}: nested too deeply for a certificate; {_AGAIN}") from None
+    except ValueError as error:
+        raise CertificateError(f"{name}: not JSON: {error}; {_AGAIN}") from None
+
+
+def _refuse(word: str) -> NoReturn:
+    raise ValueError(f"{word} is not a number in JSON")
+
+
+def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"the key '{key[:60]}' stands twice in one place")
+        found[key] = value
+    return found
+
+
+def _checked(name: str, plain: Any) -> Signed:
+    form = plain.get("schema") if isinstance(plain, dict) else None
+    if form is None:
+        raise CertificateError(f'{name}: not a certificate, as it does not begin with "schema": "{SCHEMA}"; {_AGAIN}')
+    if form != SCHEMA:
+        raise CertificateError(
+            f"{name}: schema: the form is '{str(form)[:60]}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with the "
+            "pidemu that wrote it, or convert again"
+        )
+    if plain.get("verdict") in ("question", "refused"):
+        what = "a question that has to be answered first" if plain["verdict"] == "question" else "a refusal"
+        raise CertificateError(f"{name}: verdict: this is {what}, not a certificate; convert again, and verify what that gives")
+    try:
+        signed = Signed.model_validate(plain)
+    except ValidationError as error:
+        raise CertificateError(f"{name}: {_fault(error.errors()[0], plain)}; {_AGAIN}") from None
+    for card in (signed.request.source.card, signed.request.to):
+        if card not in signed.cards:
+            raise CertificateError(f"{name}: cards: the version of {card} is missing; {_AGAIN}")
+    return signed
+
+
+def _fault(error: ErrorDetails, plain: Any) -> str:
+    """Return the place and what is wrong there."""
+    path, value = [], plain
+    for step in error["loc"]:
+        inside = (isinstance(value, dict) and step in value) or (
+            isinstance(value, list) and isinstance(step, int) and step < len(value)
+        )
+        if inside:
+            value = value[step]
+            path.append(str(step)[:60])
+    if error["type"] == "missing":
+        return f"{'.'.join([*path, str(error['loc'][-1])])}: missing"
+    place = ".".join(path)
+    if error["type"] == "extra_forbidden":
+        return f"{place}: an unknown key"
+    message = error["msg"].removeprefix("Input ")
+    return f"{place}: {message[0].lower()}{message[1:]}, and is {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return "a list" if isinstance(value, list) else "a group of keys"
+    return json.dumps(value)[:60]

@@ -1,0 +1,319 @@
+"""Verifying a signed certificate: it is computed again from what was asked, and compared with what it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import pidemu
+from pidemu.card.library import load_card
+from pidemu.card.load import Card
+from pidemu.certificate.figures import number
+from pidemu.conversion.convert import convert
+from pidemu.conversion.document import card_versions
+from pidemu.conversion.result import Conversion
+from pidemu.conversion.schema import AsGiven, Asked
+from pidemu.conversion.signed import Signed, read_signed
+from pidemu.errors import CardNotFoundError, CertificateError, ConversionRefusedError, PidemuError, QuestionError
+
+DIAL: Final = 1e-6
+"""Relative difference up to which a dial is the same: optimisers and other processors end that near, and no dial is set finer."""
+FIGURE: Final = 1e-4
+"""The same of a figure: the largest of a curve, the root of a margin and the area of a response are found that exactly, and are
+printed to two to four digits."""
+ZERO: Final = 1e-5
+"""Difference of figures that is none, whatever their size: what rounding dials to five digits makes of zero [1, dB, deg, s]."""
+_PLACES: Final = frozenset({"worst_at", "largest_at", "notes", "text"})
+"""What is not compared: where a largest value is, which jumps between equal ones, and wording."""
+SHORT: Final = 12
+"""Digits of a card's version in print."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One thing that is not as the certificate says.
+
+    Attributes
+    ----------
+    kind : {"conversion", "dial", "option", "verdict", "condition", "action", "bench check", "figure"}
+        What it is.
+    name : str
+        Which one; empty where there is but one.
+    before, after : str
+        What the certificate says, and what comes out now.
+    """
+
+    kind: str
+    name: str
+    before: str
+    after: str
+
+    def __str__(self) -> str:
+        what = f"{self.kind} {self.name}".strip()
+        return f"{what}: {self.before} on the certificate, {self.after} now"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What came of computing a certificate again.
+
+    Attributes
+    ----------
+    name : str
+        The file.
+    signed : Signed
+        The certificate.
+    conversion : Conversion or None
+        The conversion as it is today; ``None`` where it is refused, or where something is asked now.
+    changes : tuple of Change
+        What is not as the certificate says.
+    cards : dict of str to str
+        Versions of the cards today.
+    """
+
+    name: str
+    signed: Signed
+    conversion: Conversion | None
+    changes: tuple[Change, ...]
+    cards: Mapping[str, str]
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether settings, verdict, conditions and figures are still those of the certificate."""
+        return not self.changes
+
+    @property
+    def title(self) -> str:
+        """What was verified, in one line."""
+        s = self.signed
+        tag = f"{s.request.tag}: " if s.request.tag else ""
+        return f"{tag}{s.request.source.card} -> {s.request.to}, certificate of {s.date} by pidemu {s.pidemu}"
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """What has another version than on the certificate."""
+        found = [
+            f"{card} is another version: {self.signed.cards[card][:SHORT]} on the certificate, {digest[:SHORT]} now"
+            for card, digest in self.cards.items()
+            if digest != self.signed.cards[card]
+        ]
+        if self.signed.pidemu != pidemu.__version__:
+            found.append(f"pidemu is another version: {self.signed.pidemu} on the certificate, {pidemu.__version__} now")
+        return tuple(found)
+
+    @property
+    def because(self) -> tuple[str, ...]:
+        """What can have caused the changes; empty where there are none."""
+        if self.unchanged:
+            return ()
+        edited = (
+            "cards and pidemu have the versions of the certificate: the file was edited after pidemu wrote it, or this pidemu was"
+        )
+        return self.versions or (edited,)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values for JSON."""
+        s = self.signed
+        return {
+            "unchanged": self.unchanged,
+            "changes": [asdict(c) for c in self.changes],
+            "because": list(self.because),
+            "date": s.date,
+            "pidemu": {"certificate": s.pidemu, "now": pidemu.__version__},
+            "cards": {card: {"certificate": s.cards[card], "now": digest} for card, digest in self.cards.items()},
+        }
+
+
+def verify(certificate: str | Path | Mapping[str, Any], vendors: Sequence[str | Path] = ()) -> Verification:
+    """Compute a signed certificate again, and say what is not as it says.
+
+    Parameters
+    ----------
+    certificate : str, path or mapping
+        The file that ``pidemu convert --json`` wrote, or `Conversion.to_dict`.
+    vendors : sequence of path, optional
+        Folders of the user's own cards, searched before the built-in ones.
+
+    Returns
+    -------
+    Verification
+        Whether dials, options, verdict, conditions and figures are unchanged, and otherwise what changed and which card or pidemu
+        has another version. Dials are compared to 1e-6, figures to 1e-4 of their size: what computing on another machine may move.
+
+    Raises
+    ------
+    CertificateError
+        The file is not a certificate, not a whole one, or has another form; or one of its cards is not there.
+
+    Examples
+    --------
+    >>> import pidemu
+    >>> s = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    >>> signed = pidemu.convert(s, "emerson/deltav").to_dict()
+    >>> pidemu.verify(signed).unchanged
+    True
+    >>> signed["to"]["settings"]["GAIN"]["value"] = 3.0
+    >>> print(pidemu.verify(signed).changes[0])
+    dial GAIN: 3 %/% on the certificate, 2 %/% now
+    """
+    name, signed = read_signed(certificate)
+    source, target = (_card(name, place, card, vendors) for place, card in _cards(signed))
+    versions = {source.id: source.digest, target.id: target.digest}
+    with np.errstate(all="ignore"):  # a file may hold any number
+        try:
+            found = _again(signed, source, target)
+        except PidemuError as error:
+            return Verification(name, signed, None, (Change("conversion", "", signed.verdict, _outcome(error)),), versions)
+        return Verification(name, signed, found, tuple(_changes(signed, found)), versions | card_versions(found))
+
+
+def _cards(signed: Signed) -> tuple[tuple[str, str], tuple[str, str]]:
+    return ("request.from.card", signed.request.source.card), ("request.to", signed.request.to)
+
+
+def _card(name: str, place: str, card: str, vendors: Sequence[str | Path]) -> Card:
+    if card.endswith((".yaml", ".yml")):
+        raise CertificateError(f"{name}: {place}: '{card}' is a file, not the id of a card; write the certificate again")
+    try:
+        return load_card(card, vendors)
+    except CardNotFoundError as error:
+        if not str(error).startswith("no card "):
+            raise
+        raise CertificateError(
+            f"{name}: {place}: there is no card '{card}'; name the folder that it lies in with --vendors DIR"
+        ) from None
+
+
+def _again(signed: Signed, source: Card, target: Card) -> Conversion:
+    """Return the conversion that the certificate is of, computed today."""
+    asked, figures = signed.request, signed.figures
+    emulate = figures.get("scan_by_scan") is not None or bool(figures.get("not_emulated"))
+    settings = replace(source.settings(_given(asked.source)), lag=asked.source.lag_on_pv)
+    try:
+        return convert(settings, target, emulate=emulate, **_arguments(asked))
+    except ConversionRefusedError as error:
+        if signed.refusal and error.nearest is not None:  # the nearest settings of a refusal were signed
+            return error.nearest
+        raise
+
+
+def _given(source: AsGiven) -> dict[str, object]:
+    ranges = {"pv_range": source.pv_range, "op_range": source.op_range}
+    return {**source.options, **source.settings, **{n: r for n, r in ranges.items() if r is not None}}
+
+
+def _arguments(asked: Asked) -> dict[str, Any]:
+    """Return the arguments of `convert`."""
+    found = {name: getattr(asked, name) for name in type(asked).model_fields if name not in ("source", "to")}
+    if asked.process is not None:
+        from pidemu.loop.process import parse_process
+
+        found["process"] = parse_process(asked.process)
+    return found
+
+
+def _outcome(error: PidemuError) -> str:
+    if isinstance(error, QuestionError):
+        return f"a question: {error}"
+    if isinstance(error, ConversionRefusedError):
+        return f"refused: {error}"
+    return f"an error: {error}"
+
+
+def _changes(signed: Signed, c: Conversion) -> Iterator[Change]:
+    """Yield what is not as the certificate says, the settings first."""
+    now = c.to_dict()
+    yield from _dials(signed, now["to"]["settings"])
+    for name in dict.fromkeys([*signed.to.options, *now["to"]["options"]]):
+        old, new = signed.to.options.get(name, "none"), now["to"]["options"].get(name, "none")
+        if old != new:
+            yield Change("option", name, old, new)
+    old, new = (f"{verdict}{', refused' if refusal else ''}" for verdict, refusal in _verdicts(signed, c))
+    if old != new:
+        yield Change("verdict", "", old, new)
+    yield from _conditions(signed, c)
+    if signed.action.text != now["action"]["text"]:
+        yield Change("action", "", signed.action.text, now["action"]["text"])
+    yield from _bench_check(signed, now["bench_check"])
+    same_program = signed.pidemu == pidemu.__version__
+    yield from (Change("figure", *x) for x in _figures("", signed.figures, now["certificate"], complete=same_program))
+
+
+def _verdicts(signed: Signed, c: Conversion) -> tuple[tuple[str, str], tuple[str, str]]:
+    return (signed.verdict, signed.refusal), (c.verdict, c.refusal)
+
+
+def _dials(signed: Signed, now: Mapping[str, Mapping[str, Any]]) -> Iterator[Change]:
+    before = signed.to.settings
+    for name in dict.fromkeys([*before, *now]):
+        old = (before[name].value, before[name].unit) if name in before else None
+        new = (now[name]["value"], now[name]["unit"]) if name in now else None
+        same = old is not None and new is not None and old[1] == new[1] and _same(float(old[0]), float(new[0]), DIAL, 0.0)
+        if not same:
+            yield Change("dial", name, _dial(old), _dial(new))
+
+
+def _dial(value: tuple[Any, str] | None) -> str:
+    return "not there" if value is None else f"{_text(value[0])} {value[1]}".removesuffix(" 1")
+
+
+def _conditions(signed: Signed, c: Conversion) -> Iterator[Change]:
+    old = {(x.card, x.path): f"{x.text} ({x.status})" for x in signed.conditions}
+    new = {(x.card, x.path): str(x) for x in c.conditions}
+    for key in dict.fromkeys([*old, *new]):
+        before, after = old.get(key, "none"), new.get(key, "none")
+        if before != after:
+            yield Change("condition", "", before, after)
+
+
+def _bench_check(signed: Signed, now: Mapping[str, Any] | None) -> Iterator[Change]:
+    old = None if signed.bench_check is None else signed.bench_check.model_dump()
+    if (old is None) != (now is None):
+        yield Change("bench check", "", *(("none" if x is None else "one") for x in (old, now)))
+    elif old is not None and now is not None:
+        yield from (Change("bench check", *x) for x in _figures("", old, now, complete=True))
+
+
+def _figures(name: str, old: Any, new: Any, *, complete: bool) -> Iterator[tuple[str, str, str]]:
+    """Yield name, old and new value of the figures that differ; those that the old program did not know only if `complete`."""
+    a, b = _number(old), _number(new)
+    if isinstance(new, dict) and isinstance(old, dict):
+        for key in new:
+            if key not in _PLACES and (complete or key in old):
+                yield from _figures(f"{name}.{key}" if name else str(key), old.get(key), new[key], complete=complete)
+    elif isinstance(new, list) and isinstance(old, list) and len(new) == len(old):
+        for k, (x, y) in enumerate(zip(old, new, strict=True)):
+            yield from _figures(f"{name}[{k}]", x, y, complete=complete)
+    elif a is not None and b is not None:
+        if not _same(a, b, FIGURE, ZERO):
+            yield name, _text(old), _text(new)
+    elif type(old) is not type(new) or (old != new and not isinstance(new, str)):  # words are not compared
+        yield name, _text(old), _text(new)
+
+
+def _number(x: Any) -> float | None:
+    if isinstance(x, bool) or not isinstance(x, int | float | str) or (isinstance(x, str) and x not in ("inf", "-inf", "nan")):
+        return None
+    try:
+        return float(x)
+    except OverflowError:  # a whole number of JSON has no largest
+        return math.inf
+
+
+def _same(a: float, b: float, relative: float, absolute: float) -> bool:
+    return math.isclose(a, b, rel_tol=relative, abs_tol=absolute) or (math.isnan(a) and math.isnan(b))
+
+
+def _text(x: Any) -> str:
+    """Return a figure in print."""
+    if isinstance(x, list | dict):
+        return f"{len(x)} entries" if isinstance(x, list) else "figures"
+    value = _number(x)
+    if value is not None:
+        return number(value)
+    return "none" if x is None else "yes" if x is True else "no" if x is False else str(x)[:80]

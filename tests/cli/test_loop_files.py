@@ -1,0 +1,48 @@
+"""Loops in files: everything that a conversion can be given, and what of it the command line overrides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.cli.helpers import told
+
+LOOP = """\
+card: yokogawa/fieldbus-pid
+settings: {GAIN: 0.6, RESET: 8}
+to: emerson/deltav
+mode: cascade
+tag: FIC-1
+scan: 0.5
+"""
+
+
+def written(folder: Path, text: str) -> str:
+    file = folder / "loop.yaml"
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+def test_one_scan_interval_mode_and_tag_stand_in_the_file(tmp_path: Path) -> None:
+    out = told("convert", "--loop", written(tmp_path, LOOP))
+    assert out.startswith("FIC-1: yokogawa/fieldbus-pid  ->  emerson/deltav\n")
+    assert "STRUCTURE=1" in out
+
+
+def test_the_command_line_counts_before_the_file(tmp_path: Path) -> None:
+    out = told("convert", "--loop", written(tmp_path, LOOP), "--mode", "auto", "--tag", "FIC-2")
+    assert out.startswith("FIC-2: ")
+    assert "STRUCTURE=2" in out
+
+
+def test_the_real_interval_and_the_action_stand_in_the_file(tmp_path: Path) -> None:
+    loop = """\
+card: allen-bradley/plc5
+settings: {EQUATION: ISA, DERIVATIVE: PV, KC: 2, TI: 1, TD: 0.1}
+to: allen-bradley/logix-pid
+scan: 0.2
+runs-every: 0.02
+action: direct
+"""
+    out = told("convert", "--loop", written(tmp_path, loop))
+    assert "Action: direct acting, PV - SP: CA 1." in out
+    assert [line.split()[1] for line in out.splitlines() if line.strip().startswith(("KP ", "KI ", "KD "))] == ["2", "0.1", "0.01"]
