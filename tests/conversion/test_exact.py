@@ -230,3 +230,13 @@ def test_equal_laws_are_exact_while_the_new_scan_loses_no_more_than_one_degree(
     assert (f"gains {-cost.phase_deg:.3g} degrees of phase" in conversion.sentence) == (phase < 0)
     assert (f"loses {cost.phase_deg:.3g} degrees of phase" in conversion.sentence) == (phase > 0)
     assert any("scan intervals differ" in w for w in conversion.warnings) == (scan[0] != scan[1])
+
+
+@pytest.mark.parametrize(("scan", "lag"), [(None, 0.05), (1.0, 1.0), (0.002, 0.002)])
+def test_a_filter_set_as_a_share_per_scan_is_carried_over_as_the_lag_that_it_is_at_the_scan(scan: float | None, lag: float) -> None:
+    """Half the new sample per scan is a lag of one scan, h (1 - f)/f; the card's own scan is 0.05 s."""
+    card = pidemu.load_card("automationdirect/directlogic")
+    source = card.settings({**card.variant({}).chosen, "GAIN": 1, "RESET": 20, "FILTER": 0.5, **HUNDRED})
+    conversion = pidemu.convert(source, "generic/standard", scan=scan, emulate=False)
+    assert conversion.settings.lag == pytest.approx(lag, rel=1e-12)
+    assert conversion.verdict == "exact"
