@@ -98,4 +98,6 @@ def rules(settings: Settings) -> list[object]:
     a = settings.algorithm()
     lags = [lag for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
     used = [a.ki and a.integral_rule, a.kd and a.derivative_rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
-    return [*used, a.precision, a.previous_pv]
+    # a series form multiplies integral and derivative: by two rules that is not what a sum of the two gives
+    mixed = bool(a.ki and a.kd) and a.integral_rule is not a.derivative_rule
+    return [*used, a.precision, a.previous_pv, mixed and a.series]

@@ -68,6 +68,7 @@ EXACT = [
     Pair("emerson/deltav", {"GAIN": 2, "RATE": 4, "STRUCTURE": "4"}, "generic/parallel"),
     Pair("emerson/deltav", {"GAIN": 2, "RESET": 30, "STRUCTURE": "5"}, "generic/parallel"),
     Pair("honeywell/tdc3000", TDC, "honeywell/tdc3000"),
+    Pair("honeywell/tdc3000", TDC, "generic/series"),  # which then integrates by the trapezoidal rule as well
     Pair("king/velocity", {"Kc": 2, "Ti": 1, "EQUATION": "8"}, "generic/standard"),
     Pair("honeywell/udc", {**UDC, "ALGO": "B"}, "generic/parallel"),
     Pair("honeywell/udc", UDC, "generic/series"),
@@ -87,11 +88,12 @@ EXACT = [
 ]
 
 OTHER_RULE = [
-    Pair("honeywell/tdc3000", TDC, "generic/series"),
-    Pair("honeywell/tdc3000", {**TDC, "CTEQN": "B"}, "generic/parallel"),
+    Pair("honeywell/tdc3000", TDC, "generic/series", options={"INTEGRAL_RULE": "backward"}),
+    Pair("honeywell/tdc3000", {**TDC, "CTEQN": "B"}, "generic/parallel", options={"INTEGRAL_RULE": "backward"}),
+    Pair("honeywell/tdc3000", {**TDC, "CTEQN": "B"}, "generic/parallel"),  # trapezoidal too, but a sum and not a product
     Pair("foxboro/pneumatic", {"PB": 50, "INT": 1, "DERIV": 0.25}, "honeywell/tdc3000"),
 ]
-"""The same law; tdc3000 integrates by the trapezoidal rule, the others by the backward one."""
+"""The same law by other rules; tdc3000 integrates by the trapezoidal rule and differentiates by the backward one."""
 
 FEEDBACK = [
     Pair("fisher/provox", PROVOX, "emerson/deltav", "exact-feedback", {"FORM": "Standard", "STRUCTURE": "1"}),
