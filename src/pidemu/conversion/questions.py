@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from pidemu.plain import json_safe
+
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
 
@@ -51,7 +53,7 @@ class Answer:
         return {
             "value": self.value,
             "says": self.says,
-            "settings": to.get("settings"),
+            "settings": json_safe(to.get("settings")),
             "options": to.get("options"),
             "outcome": self.outcome,
             "command": self.command,
