@@ -284,7 +284,12 @@ class Law:
 
     @cached_property
     def _rational(self) -> tuple[Rational, Rational]:
-        return paths(self.algorithm, CONTINUOUS if self.scan is None else discrete_operators(self.algorithm, self.scan))
+        a = self.algorithm
+        if self.scan is None:
+            return paths(a, CONTINUOUS)
+        if not a.kd and a.filter_on == "term":  # nothing passes its filter, whose pole need not be stable then
+            a = replace(a, Tf=0.0)
+        return paths(a, discrete_operators(a, self.scan))
 
     @property
     def feedback(self) -> Rational:

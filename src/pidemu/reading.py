@@ -124,7 +124,7 @@ def _read(
             return None
         raise SettingError(f"missing; it {_purpose(setting)}, in {unit.name}")
     number, written, note = _number(given, setting, unit, spans, form, ranged)
-    typed = given if isinstance(given, str | float) else number
+    typed = given if isinstance(given, str) and written else number
     unclear = note != "" and isinstance(given, str) and _counts_the_other_way(given, setting, unit, form)
     value = Value(name, setting, number, unit.name, spans, active=active, note=note, typed=typed, unclear=unclear)
     _check(value, given if written else None)

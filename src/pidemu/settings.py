@@ -189,8 +189,12 @@ class Settings(Mapping[str, Value]):
         return any(parse_unit(v.unit).scans and v.active and not v.off for v in self.values())
 
     def at_scan(self, scan: float | None) -> Settings:
-        """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none."""
-        if scan is None or self.scan is None:
+        """Return these settings with dials that count in scans read at a scan interval [s]; the same where there are none.
+
+        A filter that is set as a share of the new sample per scan counts in scans too.
+        """
+        shares = any(v.role is Role.FILTER_FACTOR and v.active and v.value != 1 for v in self.values())
+        if scan is None or (self.scan is None and not shares):
             return self
         values = {name: replace(v, spans=replace(v.spans, scan=scan)) for name, v in self.items()}
         return replace(self, values_by_name=values, scan=scan)

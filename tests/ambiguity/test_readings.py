@@ -114,7 +114,7 @@ def test_the_form_is_open_where_it_matters() -> None:
 def test_without_derivative_the_form_does_not_matter() -> None:
     (only,) = pidemu.readings("emerson/deltav", GAIN=2, RESET="60 s")
     assert only.text == "RESET = 60 s, card emerson/deltav"
-    assert set(only.settings.defaulted) == {"FORM", "STRUCTURE"}
+    assert set(only.settings.defaulted) == {"FORM", "STRUCTURE", "FRSIPID_OPTS"}
 
 
 def test_an_option_that_is_given_is_not_open() -> None:

@@ -103,3 +103,10 @@ def test_a_filter_dial_that_counts_the_other_way_is_turned_down() -> None:
     assert change.dial is not None
     assert (change.dial.name, change.dial.value < 30) == ("KD", True)
     assert noise_gain(foxboro.changed({"KD": change.dial.value}), 0.2) <= change.source
+
+
+def test_a_filter_without_a_derivative_does_not_amplify_noise_though_the_scan_is_slow() -> None:
+    """A forward rule with Tf = 0.1 s is unstable at 2 s, and nothing passes it where the derivative is off."""
+    options = {"FORM": "parallel", "IFormula": "ForwardEuler", "DFormula": "ForwardEuler"}
+    s = pidemu.load_card("mathworks/pid2").settings({**options, "Kp": 50, "Ki": 0.5, "Kd": 0, "Tf": 0.1})
+    assert noise_gain(s, 2.0) == 50  # the integral is updated after the output

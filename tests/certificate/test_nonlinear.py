@@ -271,8 +271,8 @@ def test_without_integral_what_a_limit_leaves_behind_is_told() -> None:
     found = differences(settings("generic/standard", K=2, Ti=math.inf), settings("king/velocity", KC=2, TI=math.inf))["windup"]
     assert found.figures == {"output after an excursion to the limit and back [% of output span]": (50.0, 20.0)}
     assert found.text == (
-        "From an output of 50 %, PV moves by 40 %, so that the output stands at 100 %, and comes back: then the old controller is at "
-        "50 %, the new one at 20 %. Without integral action nothing removes this difference, and every limit adds to it."
+        "From an output of 50 %, PV moves by 40 %, so that the output stands at 100 %, and comes back: then the old controller is "
+        "at 50 %, the new one at 20 %. Without integral action nothing removes this difference, and every limit adds to it."
     )
 
 

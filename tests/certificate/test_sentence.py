@@ -174,7 +174,9 @@ def test_two_that_recover_differently_from_a_limit_are_alike_inside_their_limits
 
 
 def test_two_that_stay_apart_after_a_limit_are_not_called_alike() -> None:
-    assert sentence(certificate(shifts_for_good=True)) == f"{SAME}but after an output limit the two outputs stay apart for good."
+    assert sentence(certificate(shifts_for_good=True)) == (
+        f"{SAME}but without integral action the new controller does not hold the output as the old one did, once it was at a limit."
+    )
 
 
 def test_a_setpoint_that_moves_otherwise_makes_setpoint_changes_different() -> None:

@@ -82,8 +82,22 @@ def needed(card: Card, options: dict[str, object] | None = None) -> dict[str, ob
     }
 
 
+HUNDRED: dict[str, object] = {"pv_range": (0, 100), "op_range": (0, 100)}
+"""Ranges as they are stated where a test is about something else: a unit is then a percent on either side."""
+
+
 def settings_that_act(data: st.DataObject, card: Card) -> Settings:
-    """Draw settings of a card with at least one term; with none there is no law to compare."""
-    drawn = settings_of(data, card)
+    """Draw settings of a card, with ranges of 0 to 100 and at least one term; with none there is no law to compare."""
+    drawn = settings_of(data, card).changed(HUNDRED)
     assume(any(drawn.law().moments()))
     return drawn
+
+
+def rules(settings: Settings) -> list[object]:
+    """Rules of the terms that are in use, and the number format."""
+    a = settings.algorithm()
+    lags = [lag for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
+    used = [a.ki and a.integral_rule, a.kd and a.derivative_rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
+    # a series form multiplies integral and derivative: by two rules that is not what a sum of the two gives
+    mixed = bool(a.ki and a.kd) and a.integral_rule is not a.derivative_rule
+    return [*used, a.precision, a.previous_pv, mixed and a.series]

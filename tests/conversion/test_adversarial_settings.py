@@ -45,7 +45,7 @@ def test_with_the_action_that_the_warnings_say_both_outputs_move_the_same_way(so
     before = first_moves(old, "reverse")
     for target in CARDS:
         held = {} if target == source else needed(pidemu.load_card(target))
-        conversion, reason = settled(old, target, given=held)
+        conversion, reason = settled(old, target, given=held, mode="auto")
         if conversion is None:
             assert "no proportional action" in reason
             continue
@@ -69,7 +69,7 @@ def test_where_the_sign_is_the_action_the_words_of_the_card_are_what_the_control
     conversion = pidemu.convert(source, target, given=needed(pidemu.load_card(target)), emulate=False)
     s = conversion.settings
     names = s.equation.action.names
-    assert any(w.startswith(f"action: reverse acting, SP - PV: {names['reverse']}; direct") for w in conversion.warnings)
+    assert conversion.action_text.startswith(f"reverse acting, SP - PV: {names['reverse']}; direct acting, PV - SP: ")
     gain = next(v for v in s.values() if v.role is Role.GAIN)
     assert (gain.value > 0) == names["reverse"].startswith("positive")
     parallel = s.equation.form == "parallel"
@@ -85,16 +85,15 @@ def test_where_the_sign_is_the_action_the_target_is_told_one_action_and_no_choic
     conversion = pidemu.convert(load(source, **dials), "fisher/provox", emulate=False)
     assert first_moves(conversion.source, "reverse")[0] == pytest.approx(2, abs=0.1)
     assert first_moves(conversion.settings, "direct")[0] == pytest.approx(2, abs=0.1)
-    words = " ".join(conversion.warnings)
-    assert "action: direct acting, PV - SP: Direct; on " in words
-    assert "reverse acting" not in words
+    assert conversion.action_text.startswith("direct acting, PV - SP: Direct")
+    assert "reverse acting" not in conversion.action_text
 
 
 ENDS: list[tuple[str, dict[str, object], str, float, str, dict[str, object]]] = [
     ("honeywell/udc", {"PBorGAIN": "PB PCT"}, "PB", 0.1, "K", {"K": 1000, "Ti": 60}),
     ("honeywell/udc", {"PBorGAIN": "PB PCT"}, "PB", 9999, "K", {"K": 100 / 9999, "Ti": 60}),
-    ("honeywell/udc", {}, "RSET", 0.02, "Ti", {"K": 2, "Ti": 1.2}),
-    ("honeywell/udc", {}, "RSET", 50, "Ti", {"K": 2, "Ti": 3000}),
+    ("honeywell/udc", {"MINorRPM": "MIN"}, "RSET", 0.02, "Ti", {"K": 2, "Ti": 1.2}),
+    ("honeywell/udc", {"MINorRPM": "MIN"}, "RSET", 50, "Ti", {"K": 2, "Ti": 3000}),
     ("honeywell/udc", {"MINorRPM": "RPM"}, "RSET", 0.02, "Ti", {"K": 2, "Ti": 3000}),
     ("honeywell/udc", {"MINorRPM": "RPM"}, "RSET", 50, "Ti", {"K": 2, "Ti": 1.2}),
     ("honeywell/udc", {}, "RATE", 0.09, "Td", {"K": 2, "Ti": 60, "Td": 5.4}),
@@ -174,7 +173,7 @@ PID_DIALS: dict[str, tuple[dict[str, object], tuple[str, str, str], tuple[float,
     "arduino/pid": ({}, ("Kp", "Ki", "Kd"), (2 * 0.8, 0.05 * 0.8, 12 * 0.8)),
     # standard and series: one
     "generic/standard": ({}, ("K", "Ti", "Td"), (2 * FACTOR, 40, 6)),
-    "honeywell/udc": ({}, ("GAIN", "RSET", "RATE"), (2 * FACTOR, 40 / 60, 0.1)),
+    "honeywell/udc": ({"MINorRPM": "MIN"}, ("GAIN", "RSET", "RATE"), (2 * FACTOR, 40 / 60, 0.1)),
     "king/velocity": ({}, ("Kc", "Ti", "Td"), (2 * FACTOR, 40 / 60, 0.1)),
     "epics/epid": ({}, ("KP", "KI", "KD"), (2 * 0.8, 1 / 40, 6)),
 }
@@ -256,8 +255,9 @@ def test_an_integral_that_is_off_stays_off_whatever_number_says_so(source: str) 
     assert old[name].canonical == 0
     for target, (others, dial, _) in OFF.items():
         options = {n: v for n, v in others.items() if isinstance(v, str)}
-        new = pidemu.convert(old, target, options=options, emulate=False).settings
-        assert not new[dial].active or new[dial].value in off_values(new[dial].setting), target
+        # a target that forgets its output at a limit is refused, with the dials all the same
+        new = pidemu.convert(old, target, options=options, emulate=False, allow_approximate=True).settings
+        assert dial not in new or not new[dial].active or new[dial].value in off_values(new[dial].setting), target
         assert new.law().moments() == pytest.approx((0, 2, 0)), target
 
 

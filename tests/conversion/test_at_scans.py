@@ -42,7 +42,8 @@ def settings(card: str | Card, **values: object) -> Settings:
 
 
 def convert(source: Settings, target: str | Card, **more: object) -> pidemu.Conversion:
-    return pidemu.convert(source, target, **{"emulate": False, **more})  # type: ignore[arg-type]
+    """Convert with compensation, which has to be asked for."""
+    return pidemu.convert(source, target, **{"emulate": False, "compensate": True, **more})  # type: ignore[arg-type]
 
 
 def increments(s: Settings, h: float, scans: int) -> Floats:
@@ -99,7 +100,8 @@ def test_from_rule_to_rule_at_one_interval_a_pid_without_filter_is_exact(kind: s
 def test_where_the_gain_would_have_to_be_negative_the_settings_of_the_continuous_law_stay(kp: float) -> None:
     found = convert(settings(CARDS["forward"], kp=kp, ki=KI), CARDS["backward"], scan=H)  # kp - ki h is below zero
     assert {n: v.value for n, v in found.settings.items()} == {"kp": kp, "ki": KI, "kd": 0.0}
-    assert found.verdict == "approximate"
+    assert not found.certificate.compensated
+    assert found.verdict == "exact"  # the same law, and the backward rule is the earlier of the two
 
 
 def test_the_textbook_s_rule_to_scale_the_gain_by_the_intervals_is_not_followed() -> None:
@@ -128,9 +130,8 @@ def test_the_moments_of_what_a_process_sees_agree(name: str, Ti: float, Td: floa
         found = convert(source, target, options=options, scan=scans)
     except ScanError:  # the forward rule needs a filter longer than half a scan
         assume(False)
-    cost = found.certificate.scan_cost
-    assert cost is not None
-    assume(cost.compensated and found.match == "low-frequency")  # else moments that agree would be farther off in the loop band
+    # else moments that agree would be farther off in the loop band
+    assume(found.certificate.compensated and found.match == "low-frequency")
     assume(memory(found.settings, scans[1]) < 500)  # the trapezoidal rule rings with a short filter, and the sums lose digits
     wanted, reached = seen(source, scans[0]), seen(found.settings, scans[1])
     sizes = 1.5 / Ti, 1.5, 1.5 * Ti, 1.5 * Ti**2
@@ -146,10 +147,10 @@ def test_the_moments_of_what_a_process_sees_agree(name: str, Ti: float, Td: floa
 def test_a_faster_scan_is_made_up_for_with_less_derivative(name: str, scans: tuple[float, float]) -> None:
     target, options = TARGETS[name]
     found = convert(settings("generic/standard", K=1.5, Ti=40, Td=6, Tf=1), target, options=options, scan=scans)
-    cost = found.certificate.scan_cost
-    assert cost is not None
-    assert cost.compensated
-    assert cost.uncompensated > 2 * found.certificate.headline.loop_band.max_deviation
+    plain = convert(found.source, target, options=options, scan=scans, compensate=False)
+    assert found.certificate.compensated
+    assert not plain.certificate.compensated
+    assert deviation(plain, scans) > 2 * deviation(found, scans)
     m0, m1, m2 = seen(found.settings, scans[1], 3)
     assert (m0, m1, m2) == pytest.approx((1.5 / 40, 1.5, 1.5 * (6 - scans[0] / 2)), rel=1e-9)  # kd - kp h/2, of the source
 
@@ -175,11 +176,11 @@ def test_settings_made_up_for_the_scans_are_never_farther_off(
     assume(all(memory(c.settings, h * times) < 1000 for c in (own, plain)))
     off, without = (deviation(c, (h, h * times)) for c in (own, plain))
     assert off <= without * (1 + 1e-6)
-    cost = own.certificate.scan_cost
-    assert cost is not None
-    made_up = own.match not in ("textbook", "constrained")  # these know nothing of scans
-    assert cost.compensated == (made_up and own.settings != plain.settings)
-    assert cost.uncompensated == pytest.approx(without if made_up else off, rel=2e-3, abs=1e-9)  # it looks closer at its peaks
+    assert not plain.certificate.compensated
+    assert own.certificate.compensated == (own.settings != plain.settings)
+    at_scan = own.certificate.feedback_at_scan
+    assert at_scan is not None
+    assert at_scan.loop_band.max_deviation == pytest.approx(off, rel=2e-3, abs=1e-9)  # it looks closer at its peaks
 
 
 def deviation(c: pidemu.Conversion, scans: tuple[float, float]) -> float:
@@ -194,20 +195,34 @@ def deviation(c: pidemu.Conversion, scans: tuple[float, float]) -> float:
 
 
 @pytest.mark.parametrize(
-    ("scans", "at", "phase"),
+    ("scans", "phase"),
     [
-        ((1.0, 0.5), 0.25, -3.580986),  # 5/Ti, and 0.25 x (-0.5)/2 rad
-        ((0.5, 1.0), 0.25, 3.580986),
-        ((2.0, 2.0), 0.25, 0.0),
-        ((1.0, 20.0), math.pi / 20, 85.5),  # where the bands end at the slower scan's Nyquist frequency: pi/20 x 19/2
+        ((1.0, 0.5), -1.140248),  # the hold alone: 0.1 x (-0.5)/2 rad, -1.43 degrees; the sum that integrates leads by the rest
+        ((0.5, 1.0), 1.140248),
+        ((2.0, 2.0), 0.0),
+        ((1.0, 20.0), 40.527261),
+        ((1.0, 40.0), math.inf),  # beyond half the slower scan's rate
     ],
 )
-def test_the_scan_cost_is_half_the_difference_of_the_intervals_as_dead_time(
-    scans: tuple[float, float], at: float, phase: float
+def test_the_scan_cost_is_the_phase_that_hold_and_rule_lose_where_the_crossover_usually_lies(
+    scans: tuple[float, float], phase: float
 ) -> None:
-    cost = convert(settings("generic/standard", K=2, Ti=20), "generic/parallel", scan=scans).certificate.scan_cost
+    plain = convert(settings("generic/standard", K=2, Ti=20), "generic/parallel", scan=scans, compensate=False)
+    cost = plain.certificate.scan_cost
     assert cost is not None
-    assert (cost.at, cost.phase_deg) == pytest.approx((at, phase), rel=1e-6)
+    assert cost.at == pytest.approx(0.1, rel=1e-12)  # 2/Ti
+    assert cost.phase_deg == pytest.approx(phase, rel=1e-6)
+    assert math.isinf(phase) or cost.phase_deg == pytest.approx(lost(*scans), rel=1e-9, abs=1e-12)
+
+
+def lost(h: float, to: float) -> float:
+    """Phase lost by a PI of 2 and 20 s at 0.1 rad/s, backward rule and hold written out, from one interval to another [deg]."""
+
+    def held(h: float) -> complex:
+        z = np.exp(-0.1j * h)
+        return complex((2 + 0.1 * h / (1 - z)) * (1 - z) / (0.1j * h))
+
+    return math.degrees(np.angle(held(h) / held(to)))
 
 
 def test_without_scan_intervals_there_is_no_scan_cost() -> None:
@@ -218,8 +233,9 @@ def test_the_same_equation_at_the_same_scan_costs_nothing() -> None:
     found = convert(settings("generic/standard", K=2, Ti=20, Td=4, Tf=0.5), "generic/parallel", scan=1.0)
     cost = found.certificate.scan_cost
     assert cost is not None
-    assert (cost.at, cost.uncompensated) == pytest.approx((0.25, 0.0), abs=1e-12)
-    assert (cost.phase_deg, cost.compensated) == (0.0, False)
+    assert cost.phase_deg == pytest.approx(0.0, abs=1e-9)  # two laws multiplied out in another order
+    assert not cost.matters
+    assert not found.certificate.compensated
     assert not any("scan intervals" in w for w in found.warnings)
 
 
@@ -230,10 +246,8 @@ def test_without_compensation_the_settings_are_those_of_the_continuous_law(name:
     source = settings("generic/series", K=1.5, Ti=40, Td=6, alpha=0.2)
     plain = convert(source, target, options=options, scan=scans, compensate=False)
     assert plain.settings == convert(source, target, options=options).settings
-    cost = plain.certificate.scan_cost
-    assert cost is not None
-    assert not cost.compensated
-    assert cost.uncompensated == plain.certificate.headline.loop_band.max_deviation
+    assert plain.settings == pidemu.convert(source, target, options=options, scan=scans, emulate=False).settings  # the default
+    assert not plain.certificate.compensated
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -262,9 +276,11 @@ def test_intervals_ten_times_apart_are_converted_with_usable_numbers(name: str, 
     target, options = TARGETS[name]
     source = settings("generic/standard", K=2, Ti=30, Td=5, Tf=2)
     found = convert(source, target, options=options, scan=scans, emulate=True)
-    cost = found.certificate.scan_cost
-    assert cost is not None
-    assert found.certificate.headline.loop_band.max_deviation <= cost.uncompensated
+    plain = convert(source, target, options=options, scan=scans, compensate=False)
+    off, without = (c.certificate.feedback_at_scan for c in (found, plain))
+    assert off is not None
+    assert without is not None
+    assert off.loop_band.max_deviation <= without.loop_band.max_deviation
     gains = [abs(x) for x in (found.settings.algorithm().kp, found.settings.algorithm().ki, found.settings.algorithm().kd)]
     assert all(0.3 * x < y < 3 * x for x, y in zip((2, 2 / 30, 10), gains, strict=True) if "lagged" not in name)
     run = found.certificate.scan_by_scan
@@ -299,7 +315,9 @@ def test_setpoint_weights_are_those_of_the_sampled_path() -> None:
 def test_a_forward_rule_gets_a_filter_with_which_it_is_stable_at_the_scan() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=30, Td=5, Tf=0.5)
     options = {"FORM": "parallel", "IFormula": "ForwardEuler", "DFormula": "ForwardEuler"}
-    conversion = pidemu.convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options, emulate=False)
+    with pytest.raises(ScanError, match=r"too short for the scan interval 1 s: the forward rule is unstable"):
+        convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options, compensate=False)
+    conversion = convert(source, "mathworks/pid2", scan=(0.1, 1.0), options=options)
     assert conversion.settings["Tf"].canonical >= 1.0  # 1 - h/Tf is the pole: below h it rings, below h/2 it is unstable
     out = pidemu.Controller(conversion.settings, 1.0, output_limits=WIDE).run(50.0, 50.0 + (np.arange(60) >= 5))
     steps = np.diff(out[7:])
@@ -308,6 +326,7 @@ def test_a_forward_rule_gets_a_filter_with_which_it_is_stable_at_the_scan() -> N
 
 def test_a_filter_that_rings_is_named_among_the_warnings() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=20, Td=4, Tf=0.5)
-    conversion = pidemu.convert(source, "modelica/limpid", scan=(0.5, 2.0), given={"Nd": 50}, emulate=False)
+    method = {"METHOD": "continuous"}  # trapezoidal rules
+    conversion = pidemu.convert(source, "modelica/limpid", options=method, scan=(0.5, 2.0), given={"Nd": 50}, emulate=False)
     assert conversion.settings.algorithm().Tf < 1.0
-    assert any("a scan interval of 2 s is long for modelica/limpid" in w and "rings" in w for w in conversion.warnings)
+    assert any("A scan interval of 2 s is long for modelica/limpid" in w and "rings" in w for w in conversion.warnings)

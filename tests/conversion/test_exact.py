@@ -1,4 +1,4 @@
-"""Where a conversion says exact, both controllers give the same output, scan by scan."""
+"""What exact means: the same law, and the same output scan by scan where interval and scan rules are the same too."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import ConversionRefusedError, ScanError
-from tests.conversion.support import difference, outputs, random_signal, settings_that_act
+from tests.conversion.support import HUNDRED, Floats, difference, outputs, random_signal, rules, settings_that_act
 
 ROUNDING = 1e-9
 """Of the span, or of what the outputs move over: sums over 200 scans of doubles, with a margin of a thousand and more."""
@@ -43,6 +43,7 @@ STANDARD = {"K": 2, "Ti": 30, "Td": 6, "Tf": 0.8, "b": 0.7, "c": 0.3}
 SERIES = {"K": 2, "Ti": 30, "Td": 6, "alpha": 0.1}
 UDC = {"GAIN": 2, "RSET": 1, "RATE": 0.1}
 BAILEY = {"K": 2, "KP": 1.5, "KI": 0.6, "KD": 0.2}
+TDC = {"K": 2, "T1": 1, "T2": 0.25, "FORM": "interactive"}
 
 EXACT = [
     Pair("generic/standard", STANDARD, "generic/parallel"),
@@ -59,13 +60,16 @@ EXACT = [
     Pair("fisher/provox", PROVOX, "emerson/deltav", options={"FORM": "Series"}),
     Pair("fisher/provox", {"GAIN": 2, "RESET": 4}, "emerson/deltav"),
     Pair("emerson/deltav", {"GAIN": 2, "RESET": 30, "RATE": 4, "FORM": "Series"}, "generic/parallel"),
-    Pair("emerson/deltav", {"GAIN": 2, "RESET": 30, "RATE": 4, "STRUCTURE": "7", "BETA": 0.4, "GAMMA": 0.2}, "generic/standard"),
+    Pair(
+        "emerson/deltav",
+        {"GAIN": 2, "RESET": 30, "RATE": 4, "FORM": "Standard", "STRUCTURE": "7", "BETA": 0.4, "GAMMA": 0.2},
+        "generic/standard",
+    ),
     Pair("emerson/deltav", {"GAIN": 2, "RATE": 4, "STRUCTURE": "4"}, "generic/parallel"),
     Pair("emerson/deltav", {"GAIN": 2, "RESET": 30, "STRUCTURE": "5"}, "generic/parallel"),
-    Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.25}, "generic/series"),
-    Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.25, "CTEQN": "B"}, "generic/parallel"),
+    Pair("honeywell/tdc3000", TDC, "honeywell/tdc3000"),
+    Pair("honeywell/tdc3000", TDC, "generic/series"),  # which then integrates by the trapezoidal rule as well
     Pair("king/velocity", {"Kc": 2, "Ti": 1, "EQUATION": "8"}, "generic/standard"),
-    Pair("foxboro/pneumatic", {"PB": 50, "INT": 1, "DERIV": 0.25}, "honeywell/tdc3000"),
     Pair("honeywell/udc", {**UDC, "ALGO": "B"}, "generic/parallel"),
     Pair("honeywell/udc", UDC, "generic/series"),
     Pair("bailey/fc18", BAILEY, "bailey/fc19"),
@@ -83,15 +87,27 @@ EXACT = [
     Pair("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0, "MODOPT": "PI"}, "fisher/provox"),
 ]
 
+OTHER_RULE = [
+    Pair("honeywell/tdc3000", TDC, "generic/series", options={"INTEGRAL_RULE": "backward"}),
+    Pair("honeywell/tdc3000", {**TDC, "CTEQN": "B"}, "generic/parallel", options={"INTEGRAL_RULE": "backward"}),
+    Pair("honeywell/tdc3000", {**TDC, "CTEQN": "B"}, "generic/parallel"),  # trapezoidal too, but a sum and not a product
+    Pair("foxboro/pneumatic", {"PB": 50, "INT": 1, "DERIV": 0.25}, "honeywell/tdc3000"),
+]
+"""The same law by other rules; tdc3000 integrates by the trapezoidal rule and differentiates by the backward one."""
+
 FEEDBACK = [
     Pair("fisher/provox", PROVOX, "emerson/deltav", "exact-feedback", {"FORM": "Standard", "STRUCTURE": "1"}),
     Pair("generic/standard", STANDARD, "generic/series", "exact-feedback"),
     Pair("generic/series", SERIES, "generic/standard", "exact-feedback", dials={"b": 1, "c": 0}),
     Pair("honeywell/udc", UDC, "honeywell/udc", "exact-feedback", {"ALGO": "B"}),
-    Pair("honeywell/tdc3000", {"K": 2, "T1": 1, "T2": 0.25}, "honeywell/tdc3000", "exact-feedback", {"CTEQN": "B"}),
+    Pair("honeywell/tdc3000", TDC, "honeywell/tdc3000", "exact-feedback", {"CTEQN": "B"}),
     Pair("bailey/fc18", BAILEY, "bailey/fc19", "exact-feedback", {"S11": "integral only"}),
     Pair(
-        "bailey/fc18", {"KP": 2, "KI": 0.5, "KD": 0.1}, "emerson/deltav", "exact-feedback", {"FORM": "Standard", "STRUCTURE": "1"}
+        "bailey/fc18",
+        {"KP": 2, "KI": 0.5, "KD": 0.1, **HUNDRED},
+        "emerson/deltav",
+        "exact-feedback",
+        {"FORM": "Standard", "STRUCTURE": "1"},
     ),
     Pair("arduino/pid", {"Kp": 2, "Ki": 0.1, "Kd": 3}, "arduino/pid", "exact-feedback", {"POn": "P_ON_M"}),
 ]
@@ -101,11 +117,34 @@ FEEDBACK = [
 def test_exact_means_the_same_output_whatever_the_setpoint_and_the_measurement_do(pair: Pair) -> None:
     conversion = pair.convert()
     assert conversion.verdict == "exact"
+    assert conversion.certificate.scan_by_scan is not None
+    assert conversion.certificate.scan_by_scan.is_exact
     for seed in range(3):
         sp, pv = random_signal(seed), random_signal(100 + seed)
         a, b = (outputs(s, sp, pv, SCAN) for s in (conversion.source, conversion.settings))
         assert np.ptp(a) > 1
         assert difference(a, b) < ROUNDING
+
+
+def smooth(scan: float) -> tuple[Floats, Floats]:
+    """Setpoint and measurement over 200 s, at rest before."""
+    t = np.arange(round(200 / scan)) * scan
+    return 50 + 5 * (1 - np.cos(t / 20)), 50 + 4 * (1 - np.cos(t / 13))
+
+
+@pytest.mark.parametrize("pair", OTHER_RULE, ids=str)
+def test_exact_by_another_scan_rule_is_the_same_output_the_faster_both_scan(pair: Pair) -> None:
+    conversion = pair.convert()
+    assert conversion.verdict == "exact"
+    assert conversion.certificate.scan_by_scan is not None
+    assert not conversion.certificate.scan_by_scan.is_exact  # the further claim is not made
+    apart = []
+    for scan in (SCAN, SCAN / 10):
+        a, b = (outputs(s, *smooth(scan), scan) for s in (conversion.source, conversion.settings))
+        apart.append(difference(a, b))
+    # backward and trapezoidal sums differ by half a scan of the integrand: in proportion to the interval
+    assert ROUNDING < apart[1]
+    assert apart[1] == pytest.approx(apart[0] / 10, rel=0.2)
 
 
 @pytest.mark.parametrize("pair", FEEDBACK, ids=str)
@@ -144,7 +183,7 @@ GENERIC = (
     seed=st.integers(0, 999),
 )
 @settings(max_examples=100)
-def test_the_verdict_at_the_scans_is_what_the_emulated_controllers_show(
+def test_exact_with_the_same_scan_rules_is_what_the_emulated_controllers_show(
     data: st.DataObject, names: tuple[str, str], scan: float, seed: int
 ) -> None:
     source = settings_that_act(data, pidemu.load_card(names[0]))
@@ -162,20 +201,44 @@ def test_the_verdict_at_the_scans_is_what_the_emulated_controllers_show(
         assume(False)
     if not conversion.source.algorithm().ki:  # positional: counted from the bias; velocity: from the output at the transfer
         a, b = a - a[0], b - b[0]
-    # the law's verdict is relative, per frequency, to 1e-9; an output adds up 120 scans of it
-    assert difference(a, b) < 100 * ROUNDING
+    shown = conversion.certificate.scan_by_scan
+    claimed = shown is not None and (shown.is_exact if conversion.verdict == "exact" else shown.is_exact_on_measurement)
+    if claimed or rules(conversion.source) == rules(conversion.settings):
+        # the law's verdict is relative, per frequency, to 1e-9; an output adds up 120 scans of it
+        assert difference(a, b) < 100 * ROUNDING
 
 
-def test_equal_laws_at_unequal_scans_are_not_exact() -> None:
-    source = pidemu.load_card("fisher/provox").settings(**PROVOX)
-    conversion = pidemu.convert(source, "generic/parallel", scan=(1.0, 0.25), compensate=False)
+@pytest.mark.parametrize(
+    ("card", "given", "target", "scan", "phase", "verdict"),
+    [
+        ("fisher/provox", PROVOX, "generic/parallel", (1.0, 0.25), -2.0, "exact"),
+        ("fisher/provox", PROVOX, "generic/parallel", (1.0, 1.1), 0.27, "exact"),
+        ("fisher/provox", PROVOX, "generic/parallel", (0.25, 1.0), 2.0, "approximate"),
+        ("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0.1}, "foxboro/ia-pid", (1.0, 1.0), 0.0, "exact"),
+        ("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0.1}, "foxboro/ia-pid", (1.0, 0.5), -0.35, "exact"),
+        ("foxboro/ia-pid", {"PBAND": 50, "INT": 1, "DERIV": 0.1}, "foxboro/ia-pid", (1.0, 8.0), 5.0, "approximate"),
+    ],
+)
+def test_equal_laws_are_exact_while_the_new_scan_loses_no_more_than_one_degree(
+    card: str, given: Mapping[str, object], target: str, scan: tuple[float, float], phase: float, verdict: str
+) -> None:
+    """At 2/Te; the sentence says which way, and never that the outputs are the same scan by scan."""
+    conversion = pidemu.convert(pidemu.load_card(card).settings(**given), target, scan=scan)
+    cost = conversion.certificate.scan_cost
     assert conversion.certificate.feedback.is_exact
-    assert conversion.verdict == "approximate"
-    assert any("scan intervals differ" in w for w in conversion.warnings)
+    assert conversion.verdict == verdict
+    assert cost is not None
+    assert cost.phase_deg == pytest.approx(phase, abs=0.05)  # as rounded above
+    assert (f"gains {-cost.phase_deg:.3g} degrees of phase" in conversion.sentence) == (phase < 0)
+    assert (f"loses {cost.phase_deg:.3g} degrees of phase" in conversion.sentence) == (phase > 0)
+    assert any("scan intervals differ" in w for w in conversion.warnings) == (scan[0] != scan[1])
 
 
-def test_equal_laws_by_unequal_rules_are_not_exact_at_the_scan() -> None:
-    source = pidemu.load_card("foxboro/ia-pid").settings(PBAND=50, INT=1, DERIV=0.1)
-    target = pidemu.load_card("foxboro/ia-pid")
-    assert pidemu.convert(source, target, scan=(1.0, 1.0)).verdict == "exact"
-    assert pidemu.convert(source, target, scan=(1.0, 0.5)).verdict == "approximate"
+@pytest.mark.parametrize(("scan", "lag"), [(None, 0.05), (1.0, 1.0), (0.002, 0.002)])
+def test_a_filter_set_as_a_share_per_scan_is_carried_over_as_the_lag_that_it_is_at_the_scan(scan: float | None, lag: float) -> None:
+    """Half the new sample per scan is a lag of one scan, h (1 - f)/f; the card's own scan is 0.05 s."""
+    card = pidemu.load_card("automationdirect/directlogic")
+    source = card.settings({**card.variant({}).chosen, "GAIN": 1, "RESET": 20, "FILTER": 0.5, **HUNDRED})
+    conversion = pidemu.convert(source, "generic/standard", scan=scan, emulate=False)
+    assert conversion.settings.lag == pytest.approx(lag, rel=1e-12)
+    assert conversion.verdict == "exact"

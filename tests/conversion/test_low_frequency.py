@@ -14,7 +14,7 @@ import pidemu
 from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
 from pidemu.units import Role
-from tests.conversion.support import Floats, outputs, settings_that_act
+from tests.conversion.support import HUNDRED, Floats, outputs, settings_that_act
 
 TABLE = {
     "textbook": {0.1: ("0.00", "0.1"), 0.3: ("0.00", "0.4"), 1: ("0.04", "1.6"), 3: ("0.36", "3.4"), 10: ("0.89", "2.3")},
@@ -27,7 +27,8 @@ TABLE = {
 @pytest.mark.parametrize("Ti", [1.0, 60.0])
 def test_the_table_that_makes_it_the_default_is_reproduced_to_its_digits(match: str | None, Ti: float) -> None:
     source = pidemu.load_card("generic/series").settings(K=1.7, Ti=Ti, Td=Ti / 4, alpha=0.1)
-    conversion = pidemu.convert(source, "emerson/deltav", given={"ALPHA": 0.125}, match=match)
+    options = {"FORM": "Standard"}  # by default the series form is kept
+    conversion = pidemu.convert(source, "emerson/deltav", options=options, given={"ALPHA": 0.125}, match=match)
     assert conversion.match == (match or "low-frequency")
     found = {}
     for x in TABLE[match]:
@@ -206,7 +207,7 @@ def measured(s: Settings, w: float, scan: float) -> complex:
 def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_a_sine(
     card: str, dials: dict[str, object], target: str, given_: dict[str, object], match: str | None
 ) -> None:
-    source = pidemu.load_card(card).settings(**dials)
+    source = pidemu.load_card(card).settings(**dials, **HUNDRED)
     conversion = pidemu.convert(source, target, given=given_, match=match)
     assert conversion.verdict == "approximate"
     band = conversion.certificate.feedback.loop_band

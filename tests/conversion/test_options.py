@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pidemu.checks.runs import working
 from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError, UndefinedError
 from pidemu.settings import Settings, limits
 from tests.checks.bench import VALID, edited, written
-from tests.conversion.support import needed
+from tests.conversion.support import HUNDRED, needed
 
 
 def usual(card_id: str) -> list[Settings]:
@@ -24,9 +25,9 @@ def usual(card_id: str) -> list[Settings]:
     found = []
     card = pidemu.load_card(card_id)
     for variant in variants(card):
-        given: dict[str, object] = {**variant.chosen, **needed(card, dict(variant.chosen))}
+        given: dict[str, object] = {**variant.chosen, **HUNDRED, **needed(card, dict(variant.chosen))}
         parallel = variant.equation.form == "parallel"
-        texts = {"gain": 2.0, "integral": "0.02 1/s" if parallel else "90 s", "derivative": "20 s" if parallel else "10 s"}
+        texts = {"gain": 2.0, "integral": "0.02 1/s" if parallel else "90 s/repeat", "derivative": "20 s" if parallel else "10 s"}
         for name, s in variant.equation.settings.items():
             if s.sets in texts and is_active(variant.equation, name, s):
                 given[name] = "200 %" if s.sets == "gain" and s.unit == "%" else texts[s.sets]
@@ -48,16 +49,17 @@ SOURCES = [(c, usual(c)[0]) for c in CARDS]
 def test_the_textbook_column_is_what_the_textbook_match_gives(source: str, target: str) -> None:
     settings = dict(SOURCES)[source]
     held = {} if source == target else needed(pidemu.load_card(target))
+    how: dict[str, Any] = {"given": held, "mode": "auto", "emulate": False}
     try:
-        conversion = pidemu.convert(settings, target, given=held, emulate=False)
+        conversion = pidemu.convert(settings, target, **how)
         shown = conversion.textbook
     except ConversionRefusedError:
         return
     if shown.settings is None:
         with pytest.raises(ConversionRefusedError):
-            pidemu.convert(settings, target, given=held, match="textbook", options=conversion.settings.options)
+            pidemu.convert(settings, target, match="textbook", options=conversion.settings.options, **how)
     else:
-        asked = pidemu.convert(settings, target, given=held, match="textbook", options=shown.settings.options)
+        asked = pidemu.convert(settings, target, match="textbook", options=shown.settings.options, **how)
         assert {n: v.value for n, v in shown.settings.items()} == {n: v.value for n, v in asked.settings.items()}
         assert shown.certificate is not None
         assert shown.certificate.feedback == asked.certificate.feedback
@@ -89,7 +91,7 @@ def test_options_that_nobody_gave_are_chosen_where_the_defaults_would_refuse() -
 def test_options_that_nobody_gave_are_chosen_for_the_best_verdict() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
     conversion = pidemu.convert(source, "emerson/deltav")
-    assert dict(conversion.chosen) == {"STRUCTURE": "7"}
+    assert dict(conversion.chosen) == {"FORM": "Series"}  # the same form; STRUCTURE 1 has P on the error and D on the measurement
     assert conversion.verdict == "exact"
     series = pidemu.convert(source, "honeywell/tdc3000")
     assert dict(series.chosen) == {"CTEQN": "B"}  # D on the measurement, as with PROVOX
@@ -107,24 +109,26 @@ def test_options_that_the_user_chose_are_kept() -> None:
 
 
 def test_the_defaults_stay_where_no_choice_does_better() -> None:
-    source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    source = pidemu.load_card("generic/standard").settings(K=2, Ti=15)
     conversion = pidemu.convert(source, "emerson/deltav")
     assert dict(conversion.chosen) == {}
     assert conversion.verdict == "exact"
 
 
-def test_every_choice_is_ranked_on_request_and_no_later_one_has_a_better_verdict() -> None:
+def test_every_choice_is_ranked_by_the_terms_that_see_the_setpoint_and_then_by_the_verdict() -> None:
     source = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.1)
-    ranking = pidemu.convert(source, "emerson/deltav", all_options=True).ranking
+    ranking = pidemu.convert(source, "emerson/deltav").ranking
     assert len(ranking) == 32  # two forms, eight structures, with and without nonlinear gain
     order = ["exact", "exact-feedback", "approximate", "refused"]
-    places = [order.index(a.verdict) for a in ranking]
+    places = [(0 if a.merit is None else a.merit.setpoint, order.index(a.verdict)) for a in ranking if a.verdict != "refused"]
     assert places == sorted(places)
+    refused = [a.verdict == "refused" for a in ranking]
+    assert refused == sorted(refused)
     assert {a.verdict for a in ranking} == {"exact", "exact-feedback", "refused"}
     for attempt in ranking:  # each as if it had been asked for
         try:
             asked = pidemu.convert(source, "emerson/deltav", options={"FORM": "Standard", "STRUCTURE": "1", **attempt.changed})
-        except ConversionRefusedError:
+        except (ConversionRefusedError, SettingError):
             assert attempt.verdict == "refused"
         else:
             assert asked.verdict == attempt.verdict
@@ -133,22 +137,23 @@ def test_every_choice_is_ranked_on_request_and_no_later_one_has_a_better_verdict
 def test_the_scan_rules_of_the_target_are_chosen_like_the_source_s() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=60, Td=10, Tf=1)
     conversion = pidemu.convert(source, "mathworks/pid2")
-    assert dict(conversion.chosen) == {"IFormula": "BackwardEuler", "DFormula": "BackwardEuler"}
+    assert dict(conversion.chosen) == {"FORM": "standard", "IFormula": "BackwardEuler", "DFormula": "BackwardEuler"}
     assert conversion.verdict == "exact"
     forced = pidemu.convert(source, "mathworks/pid2", options={"IFormula": "Trapezoidal", "DFormula": "Trapezoidal"})
     assert forced.certificate.feedback.is_exact
-    assert forced.verdict == "approximate"
-    assert "the two equations are the same" in forced.sentence
+    assert forced.certificate.scan_by_scan is not None
+    assert not forced.certificate.scan_by_scan.is_exact
+    assert conversion.certificate.scan_by_scan is not None
+    assert conversion.certificate.scan_by_scan.is_exact
 
 
 def test_negative_gains_become_positive_ones_with_the_other_action() -> None:
-    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2, Ki=-0.05)
+    source = pidemu.load_card("simple-pid/simple-pid").settings({"Kp": -2, "Ki": -0.05, **HUNDRED})
     conversion = pidemu.convert(source, "emerson/deltav")
     assert (conversion.settings["GAIN"].value, conversion.settings["RESET"].value) == (2, 40)
     assert conversion.verdict == "exact"
     direct = "direct acting, PV - SP"
     assert conversion.action_text == f"{direct}: Direct_Acting on in CONTROL_OPTS"  # the source has no switch: its sign says it
-    assert f"action: {conversion.action_text}; on simple-pid/simple-pid: {direct}: negative gains" in conversion.warnings
     sp, pv = np.full(50, 50.0), 50 + np.sin(np.arange(50) / 5)
     old = pidemu.Controller(source, 1.0, output_limits=(-1e6, 1e6)).run(sp, pv)
     new = pidemu.Controller(conversion.settings, 1.0, "direct", output_limits=(-1e6, 1e6)).run(sp, pv)
@@ -168,11 +173,13 @@ def test_a_card_in_engineering_units_takes_the_ranges() -> None:
     assert not any("no ranges" in w or "not all ranges" in w for w in conversion.warnings)
 
 
-def test_without_ranges_a_card_in_engineering_units_says_what_is_taken() -> None:
+def test_without_ranges_a_card_in_engineering_units_asks_or_says_what_is_assumed() -> None:
     source = pidemu.load_card("bailey/fc19").settings(KP=2, KI=0.5)
-    found = pidemu.convert(source, "emerson/deltav").warnings[:2]
-    assert [w.partition(",")[0] for w in found] == ["the PV range is not given", "the output range is not given"]
-    assert all(w.endswith("0 to 100 is taken") for w in found)
+    with pytest.raises(pidemu.QuestionError) as error:
+        pidemu.convert(source, "emerson/deltav")
+    assert [(q.kind, q.about) for q in error.value.questions][:1] == [("range", "pv_range")]
+    taken = [w for w in pidemu.convert(source, "emerson/deltav", assume=True).warnings if w.endswith("0 to 100 is taken.")]
+    assert [w.partition(",")[0] for w in taken] == ["The PV range is not given", "The output range is not given"]
 
 
 @pytest.mark.parametrize("value", ["2 eu/eu", "50 eu", "2 %/eu"])
@@ -219,7 +226,7 @@ def test_rounding_keeps_notes_and_never_makes_an_infinite_gain(tmp_path: Path) -
     )
     target = pidemu.load_card(written(tmp_path, text))
     source = pidemu.load_card("generic/standard").settings(K=100, Ti="1 min")
-    conversion = pidemu.convert(source, target, round_dials=True)
+    conversion = pidemu.convert(source, target, digits=5)
     assert conversion.settings["GAIN"].value == 5
     assert [d.name for d in conversion.certificate.dials] == ["GAIN"]
     assert conversion.source.notes == ("Ti: 1 min is 60 s",)
@@ -240,8 +247,12 @@ def test_a_range_far_from_the_source_is_refused_without_a_crash(tmp_path: Path, 
 
 
 def test_noise_is_compared_without_the_sign_of_the_gains() -> None:
-    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2, Ki=-0.05, Kd=-20)
-    assert any("measurement noise" in w for w in pidemu.convert(source, "emerson/deltav").warnings)
+    card = pidemu.load_card("simple-pid/simple-pid")
+    both = [card.settings({"Kp": 2 * k, "Ki": 0.05 * k, "Kd": 20 * k, **HUNDRED}) for k in (-1, 1)]
+    found = [pidemu.convert(s, "emerson/deltav", scan=(1.0, 0.1), emulate=False).warnings for s in both]
+    noise = [[w for w in warnings if w.startswith("Measurement noise")] for warnings in found]
+    assert len(noise[0]) == 1
+    assert noise[0] == noise[1]
 
 
 def test_a_card_file_is_a_target(tmp_path: Path) -> None:

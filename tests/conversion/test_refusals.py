@@ -69,14 +69,14 @@ SHAPE = [
         "generic/standard",
         {"K": 2, "Ti": 60, "Td": 30},
         "fisher/provox",
-        "needs 4.571 or more",
+        "needs 4.571 times or more",
     ),
     Refusal(
         "complex zeros into a filtered series",
         "generic/standard",
         {"K": 2, "Ti": 60, "Td": 30},
         "emerson/deltav",
-        "needs 4.5 or more",
+        "needs 4.5 times or more",
         {"FORM": "Series"},
         {"ALPHA": 0.125},
     ),
@@ -126,7 +126,7 @@ RANGE = [
     Refusal(
         "derivative 30 times the integral time",
         "honeywell/tdc3000",
-        {"K": 1, "T1": 1, "T2": 30},
+        {"K": 1, "T1": 1, "T2": 30, "FORM": "interactive"},
         "emerson/deltav",
         "RATE would have to be negative",
         {"FORM": "Standard"},
@@ -159,7 +159,7 @@ def test_where_nearest_settings_are_offered_they_are_returned_on_request_and_mar
     assert allowed.match == "constrained"
     assert allowed.verdict == "approximate"
     assert allowed.refusal == str(error)
-    assert allowed.warnings[0] == f"these are only the nearest settings: {error}"
+    assert allowed.warnings[0] == f"These are only the nearest settings: {error}."
     assert allowed.certificate.feedback.loop_band.max_deviation < 1, "farther than no controller at all"
 
 
@@ -238,13 +238,15 @@ def test_a_missing_proportional_term_is_approached_by_a_long_filtered_derivative
     assert nearest.settings.law().moments()[0] == pytest.approx(2 / 60)
 
 
-def test_a_filter_ratio_out_of_range_is_no_refusal_but_the_nearest_filter_with_its_cost() -> None:
+def test_a_derivative_without_filter_is_not_imitated_the_delivered_filter_stays_with_its_cost() -> None:
     source = pidemu.load_card("generic/standard").settings(K=2, Ti=60, Td=12, Tf=0)
     conversion = pidemu.convert(source, "emerson/deltav")
-    assert conversion.match == "low-frequency"
-    assert conversion.settings["ALPHA"].value == pytest.approx(0.05, rel=1e-9)  # the least the range allows
+    dials = {n: conversion.settings[n].value for n in ("GAIN", "RESET", "RATE", "ALPHA")}
+    assert dials == pytest.approx({"GAIN": 2, "RESET": 60, "RATE": 12, "ALPHA": 0.125}, rel=1e-12)
     assert conversion.verdict == "approximate"
-    assert 0 < conversion.certificate.feedback.loop_band.max_deviation < 0.06
+    s = 1j * 5 / 60  # where the loop band ends, 5/Te
+    cost = abs((1 + 1 / (60 * s) + 12 * s / (1 + 1.5 * s)) / (1 + 1 / (60 * s) + 12 * s) - 1)
+    assert conversion.certificate.feedback.loop_band.max_deviation == pytest.approx(cost, rel=1e-9)
 
 
 def test_an_exact_match_that_is_asked_for_is_refused_where_the_filter_ratio_is_out_of_range() -> None:
@@ -299,19 +301,19 @@ def test_a_dial_at_the_end_of_its_range_is_inside_it() -> None:
         {"RSET": 1, "RATE": 0.09},
         {"RSET": 1, "RATE": 10},
     ):
-        source = pidemu.load_card("honeywell/udc").settings(**{"GAIN": 0.05, **dials})
+        card = pidemu.load_card("honeywell/udc")
+        source = card.settings({**card.variant({}).chosen, "GAIN": 0.05, **dials})
         assert pidemu.convert(source, "honeywell/udc").verdict == "exact"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"match": "best"}, "match is 'best'; it is one of exact, low-frequency, textbook"),
+        ({"match": "best"}, "match is 'best'; it is one of exact, same-numbers, low-frequency, textbook"),
         ({"given": {"GAIN": 2}}, "GAIN is what the conversion computes; it cannot be given"),
         ({"given": {"ALPHB": 0.1}}, "unknown setting 'ALPHB' (did you mean 'ALPHA'?)"),
         ({"given": {"ALPHA": 2}}, "outside 0.05 to 1"),
         ({"options": {"FORM": "Serie"}}, "did you mean 'Series'?"),
-        ({"to_pv_range": (0, 200)}, "the target's PV range is 0 to 200, the source's is not given; give both"),
     ],
 )
 def test_wrong_wishes_are_errors_and_no_refusals(arguments: dict[str, object], message: str) -> None:
@@ -320,3 +322,12 @@ def test_wrong_wishes_are_errors_and_no_refusals(arguments: dict[str, object], m
         pidemu.convert(source, "emerson/deltav", **arguments)  # type: ignore[arg-type]
     assert not isinstance(error.value, ConversionRefusedError)
     assert message in str(error.value)
+
+
+def test_a_new_range_of_the_target_alone_is_a_question_about_the_source_s() -> None:
+    source = pidemu.load_card("fisher/provox").settings(**PROVOX)
+    with pytest.raises(pidemu.QuestionError) as error:
+        pidemu.convert(source, "emerson/deltav", to_pv_range=(0, 200))
+    (question,) = error.value.questions
+    assert (question.kind, question.about) == ("range", "pv_range")
+    assert "the target's PV range is 0 to 200, the source's is not given; give both" in question.text

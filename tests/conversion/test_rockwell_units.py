@@ -20,11 +20,13 @@ FORMS = [("independent", "false"), ("dependent", "true")]
 
 
 def pid(**dials: object) -> pidemu.Settings:
-    return pidemu.load_card(PID).settings(dials)
+    """Settings of the PID; independent gains where the equation is not named."""
+    return pidemu.load_card(PID).settings({"PE": "independent", **dials})
 
 
 def pide(**dials: object) -> pidemu.Settings:
-    return pidemu.load_card(PIDE).settings(dials)
+    """Settings of the PIDE; independent gains where the form is not named."""
+    return pidemu.load_card(PIDE).settings({"DependIndepend": "false", **dials})
 
 
 def values(conversion: pidemu.Conversion, *names: str) -> list[float]:
@@ -63,6 +65,13 @@ def test_independent_gains_of_the_pid_are_60_times_the_integral_and_a_sixtieth_o
     assert conversion.verdict == "exact"
     back = pidemu.convert(conversion.settings, PID, options={"NDF": "on"}, scan=1.0)
     assert values(back, "KP", "KI", "KD") == pytest.approx([KP, KI, KD], rel=1e-12)
+
+
+def test_the_same_equation_and_rules_at_one_scan_that_is_too_slow_are_exact_and_the_scan_is_named() -> None:
+    """An integral time of half a second at a scan of one: nothing is lost from one controller to the other."""
+    conversion = pidemu.convert(pid(KP=0.5, KI=1, KD=0, NDF="on"), PIDE, options={"DSmoothing": "false"}, scan=1.0)
+    assert conversion.verdict == "exact"
+    assert "Both scans are too slow for this loop" in conversion.sentence
 
 
 def test_dependent_gains_stay_as_they_are_in_minutes() -> None:
@@ -159,7 +168,9 @@ def test_smoothing_is_exact_on_both_sides_only_and_then_rests_on_assumptions_of_
     assert not agree_scan_by_scan(rough)
     assert agree_scan_by_scan(smooth)
     for card in (PID, PIDE):
-        assert any(a.startswith(f"{card}: derivative.filter") for a in smooth.law_assumptions)
+        found = [c for c in smooth.conditions if c.card == card and c.path.startswith("derivative.filter")]
+        assert [c.status for c in found] == ["assumed"]
+        assert found[0].text in smooth.sentence
 
 
 def test_a_time_per_repeat_is_no_unit_of_an_independent_integral_gain() -> None:

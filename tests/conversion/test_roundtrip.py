@@ -107,8 +107,8 @@ def deviation(s: Settings, t: Settings, low: float, high: float) -> float:
 def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObject, names: tuple[str, str]) -> None:
     a = settings_that_act(data, pidemu.load_card(names[0]))
     try:
-        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])), emulate=False)
-        back = pidemu.convert(there.settings, a.card, options=a.options, given=uncomputed(a), emulate=False)
+        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])), mode="auto", emulate=False)
+        back = pidemu.convert(there.settings, a.card, options=a.options, given=uncomputed(a), mode="auto", emulate=False)
     except ConversionRefusedError:
         assume(False)
     bands = [c.certificate.feedback.loop_band for c in (there, back)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,6 @@ import pytest
 
 import pidemu
 from pidemu.conversion.spans import range_questions, ranges_needed, signals_note
-from pidemu.errors import SettingError
 from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
@@ -77,14 +77,23 @@ def test_the_same_loop_in_another_unit_gets_the_same_settings(to_pv_range: str) 
 
 def test_two_pairs_of_numbers_without_units_are_asked_about_with_what_states_each_reading() -> None:
     source = load("fisher/provox", GAIN=2, RESET=4, pv_range=(0, 200))
-    with pytest.raises(SettingError) as error:
+    with pytest.raises(pidemu.QuestionError) as error:
         convert(source, "emerson/deltav", to_pv_range=(0, 400))
-    assert str(error.value).splitlines() == [
-        "fisher/provox: PV range: are 0 to 200 (source) and 0 to 400 (target) the same signal, or two ranges of one quantity?",
-        '  the same signal (ends correspond): the gain in percent stays: --pv-range "0,200 = 0,400" --to-pv-range "0,400"',
-        "  another range of the same quantity: the gain in percent is multiplied by 2: "
-        '--pv-range "0,200 eu" --to-pv-range "0,400 eu"',
+    (question,) = error.value.questions
+    assert (question.kind, question.about) == ("scale", "pv_range")
+    assert question.text == (
+        "fisher/provox: PV range: are 0 to 200 (source) and 0 to 400 (target) the same signal, or two ranges of one quantity?"
+    )
+    assert [a.says for a in question.readings] == [
+        "the same signal (ends correspond): the gain in percent stays",
+        "another range of the same quantity: the gain in percent is multiplied by 2",
     ]
+    assert [shlex.split(a.command)[5:] for a in question.readings] == [
+        ["--pv-range=0,200 = 0,400", "--to", "emerson/deltav", "--to-pv-range=0,400"],
+        ["--pv-range=0,200 eu", "--to", "emerson/deltav", "--to-pv-range=0,400 eu"],
+    ]
+    answered = [a.conversion for a in question.readings]
+    assert [dials(c, "GAIN") for c in answered if c is not None] == [[2], [4]]
 
 
 @pytest.mark.parametrize(("own", "gain"), [("0,200 = 0,400", 2), ("0,200 eu", 4)])
@@ -99,7 +108,7 @@ BOTH = ("pv_range", "op_range")
 
 
 def needed(source: Settings, target: str, **how: Any) -> tuple[str, ...]:
-    return ranges_needed(source, convert(source, target, **how).settings)
+    return ranges_needed(source, convert(source, target, assume=True, **how).settings)
 
 
 def test_a_source_in_engineering_units_and_a_target_in_percent_need_both_ranges() -> None:
@@ -180,7 +189,7 @@ def test_a_generic_card_takes_the_signals_of_the_other_side(generic: str) -> Non
     assert ranges_needed(found.source, found.settings) == ()
     assert next(v for v in found.settings.values() if v.setting.sets == "gain").value == 2
     assert "in output units per PV unit; give both ranges for percent" in signals_note(found.source, found.settings)
-    assert signals_note(found.source, found.settings) in found.warnings
+    assert f"{signals_note(found.source, found.settings)}." in found.warnings
 
 
 def test_a_generic_card_is_in_percent_as_soon_as_a_range_is_given() -> None:
@@ -297,4 +306,12 @@ def test_ranges_are_needed_exactly_where_a_span_twice_as_wide_changes_a_dial(sou
     changes = tuple(
         name for name, values in wider.items() if values != pytest.approx(once, rel=1e-6)
     )  # as near as matches are found
-    assert ranges_needed(plain, convert(plain, target, given=held_dials(card), allow_approximate=True).settings) == changes
+    assumed = convert(plain, target, given=held_dials(card), allow_approximate=True, assume=True)
+    assert ranges_needed(plain, assumed.settings) == changes
+    if changes:
+        with pytest.raises(pidemu.QuestionError) as caught:
+            convert(plain, target, given=held_dials(card), allow_approximate=True)
+        asked = tuple(q.about for q in caught.value.questions if q.kind == "range")
+        # output limits of 0 to 100 on the card whose gain is per unit say that its output is in percent
+        percent = {s.equation.output.limits for s in (plain, assumed.settings) if s.equation.signals == "engineering"} == {(0, 100)}
+        assert asked == tuple(which for which in changes if not (which == "op_range" and percent))

@@ -531,6 +531,6 @@ def test_the_code_converts_an_unfiltered_pid_exactly_from_rule_to_rule(rules: tu
         increments = {v: numbers(read(cell), at) for v, cell in zip(q, rows[rules[0].value][1:4], strict=True)}
         wanted = [numbers(read(cell), {**increments, h: at[h]}) for cell in rows[rules[1].value][4:]]
         source = cards[0].settings({str(name): at[name] for name in (kp, ki, kd)})
-        conversion = pidemu.convert(source, cards[1], scan=at[h])
+        conversion = pidemu.convert(source, cards[1], scan=at[h], compensate=True)
         assert [conversion.settings[name].value for name in ("kp", "ki", "kd")] == pytest.approx(wanted, rel=1e-9)
         assert conversion.verdict == "exact"

@@ -10,13 +10,14 @@ import pytest
 
 import pidemu
 from pidemu import Controller, Settings
+from pidemu.canonical import default_scan
 from pidemu.card.base import Form
 from pidemu.card.load import Card
 from pidemu.card.references import is_active
 from pidemu.cutover.plan import TransferPlan, transfer_plan
 from pidemu.errors import SettingError
 from pidemu.settings import limits
-from pidemu.units import Role, from_canonical, parse_unit
+from pidemu.units import Role, Spans, from_canonical, parse_unit
 from tests.helpers import option_combinations
 
 SP, PV, OP = 54.0, 50.0, 43.0
@@ -50,12 +51,13 @@ def typical(card: Card, options: dict[str, str]) -> Settings:
     equation = card.variant(options).equation
     backwards = equation.action.fixed and equation.action.reverse == "pv - sp"
     given: dict[str, object] = dict(options)
+    spans = Spans(scan=default_scan(equation))  # a ramp may count per scan
     for name, s in equation.settings.items():
         role = Role(s.sets)
         left = s.default is not None and (role not in _TYPICAL or role is Role.INTEGRAL_LIMIT)
         if left or not is_active(equation, name, s):
             continue
-        value = from_canonical(role, -1.5 if backwards and role is Role.GAIN else _TYPICAL[role], parse_unit(s.unit))
+        value = from_canonical(role, -1.5 if backwards and role is Role.GAIN else _TYPICAL[role], parse_unit(s.unit), spans)
         low, high = limits(s)
         value = value if low < 0 else min(max(value, low), high)
         given[name] = round(value / s.resolution) * s.resolution if s.resolution else value

@@ -63,7 +63,7 @@ def test_the_sign_of_the_gain_is_the_action_and_nothing_is_asked() -> None:
 
 
 def test_the_sign_of_the_source_s_gain_tells_the_action_of_a_target_with_a_switch() -> None:
-    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2)
+    source = pidemu.load_card("simple-pid/simple-pid").settings(Kp=-2, pv_range=(0, 100), op_range=(0, 100))
     plan = pidemu.convert(source, "emerson/deltav").transfer_plan(50, 55, 60)
     assert numbers(plan)["bias"] == 50.0
 

@@ -64,7 +64,7 @@ def test_the_iec_block_without_gain_puts_out_nothing_in_manual_so_the_valve_is_h
 
 
 def test_filters_that_do_not_settle_in_any_reasonable_time_are_named() -> None:
-    plan = plan_for("gnc-tools/cpid", Kp=1.2, Ki=0.15, rRampMax=1e-4)  # 54 at 0.0001 per second
+    plan = plan_for("gnc-tools/cpid", Kp=1.2, Ki=0.15, rRampMax=1e-4)  # 54 by 0.0001 per scan
     assert "until its filters and differences have settled, more than 26214.4 s" in sentences(plan)
     assert any("have not settled after 262144 scans" in note for note in plan.notes)
 
@@ -108,10 +108,10 @@ def test_the_ros_class_without_derivative_gets_its_integral_and_keeps_its_setpoi
 def test_cpid_computes_unused_until_its_ramp_is_there_and_then_gets_its_integral() -> None:
     plan = plan_for("gnc-tools/cpid", Kp=1.2, Ki=0.15, Kd=0.8, Tf=0.6, b=0.7, c=0.3, rRampMax=0.5)
     assert numbers(plan) == {"SP": SP, "I": pytest.approx(OP - 1.2 * (0.7 * SP - PV), abs=1e-12)}
-    assert wait(plan) >= SP / 0.5 / 0.1  # from 0 at 0.5 per second, in scans of 0.1 s
+    assert wait(plan) >= SP / 0.5  # from 0 by 0.5 per scan
     assert plan.is_bumpless
     # without the plan: P and the kick of D at the first scan of all, for a setpoint that has come up by one scan's reach
-    assert plan.without_plan == pytest.approx((1.2 * 0.7 * 0.05 - 1.2 * PV) + 0.8 / 0.6 * (0.3 * 0.05 - PV) - OP, abs=1e-9)
+    assert plan.without_plan == pytest.approx((1.2 * 0.7 * 0.5 - 1.2 * PV) + 0.8 / 0.6 * (0.3 * 0.5 - PV) - OP, abs=1e-9)
 
 
 def test_pid2_gets_the_integral_that_p_leaves() -> None:

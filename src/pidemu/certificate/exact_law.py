@@ -171,7 +171,7 @@ def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None
     InexactError
         A number is not known exactly.
     """
-    read = algorithm_as_read(ExactReader(settings, exact_spans(settings), dials=dials or {}))
+    read = algorithm_as_read(ExactReader(settings, exact_spans(settings), dials=dials or {}), settings.scan)
     if settings.pace != 1:
         read = read.paced(cast(float, as_typed(settings.pace)))
     if settings.lag and read.pv_filter is None:

@@ -240,7 +240,8 @@ class ScanCost:
         The crossover of the loop, or where it usually lies without a process [rad/s]; NaN for proportional action alone.
     phase_deg : float
         Phase that the target, sampled and held, loses there against the source [deg]; negative: it gains. Infinite where it cannot
-        be said, since a scan is too slow.
+        be said, since one of two scans is too slow; where both have one interval that is, what their rules lose at a quarter of the
+        scan rate.
     too_slow : {"", "source", "target", "both"}
         Whose scan interval is so long that half the scan rate lies below that frequency.
     """

@@ -13,6 +13,9 @@ from pidemu.law import Law
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
 
+_BELOW = 0.5
+"""Share of half the scan rate at which rules are compared where the crossover lies beyond it."""
+
 
 def usual_crossover(law: Law) -> float:
     """Return where the crossover of a loop usually lies [rad/s]: at ``2/Te``, with ``Te = m1/m0`` the effective integral time.
@@ -47,7 +50,13 @@ def scan_cost(source: Law, target: Law, factor: float = 1.0, process: Process | 
         at = at if found is None else found
     slow = [math.isfinite(at) and at >= math.pi / law.scan for law in (source, target) if law.scan is not None]
     too_slow: TooSlow = "both" if all(slow) else "source" if slow[0] else "target" if slow[1] else ""
+    if source.scan == target.scan and too_slow:  # only rules can differ: judged where there still is something to compare
+        return ScanCost(at, _phase_lost(source, target, plain, _BELOW * math.pi / source.scan), too_slow)
     if too_slow or not math.isfinite(at):
         return ScanCost(at, math.inf if too_slow else 0.0, too_slow)
-    ratio = target.held(at) / source.held(at) / (plain[1].response(at) / plain[0].response(at))
-    return ScanCost(at, 0.0 - math.degrees(float(np.angle(ratio)[()])), "")
+    return ScanCost(at, _phase_lost(source, target, plain, at), "")
+
+
+def _phase_lost(source: Law, target: Law, plain: tuple[Law, Law], w: float) -> float:
+    ratio = target.held(w) / source.held(w) / (plain[1].response(w) / plain[0].response(w))
+    return 0.0 - math.degrees(float(np.angle(ratio)[()]))

@@ -140,9 +140,9 @@ def _rules(settings: Settings) -> tuple[object, ...]:
     """Return what makes a sequence of outputs out of a law: scan rules, order of things within a scan."""
     a = settings.algorithm()
     lags = (a.sp_filter, a.pv_filter, a.e_filter)
-    mixed = a.series and a.ki and a.kd and a.integral_rule != a.derivative_rule  # I times D is not a constant then
+    mixed = bool(a.ki and a.kd) and a.integral_rule is not a.derivative_rule  # then a product of both is not a sum of both
     return (
-        bool(mixed),
+        mixed and a.series,
         a.integral_rule if a.ki else None,
         a.derivative_rule if a.kd else None,
         a.filter_rule if a.Tf else None,

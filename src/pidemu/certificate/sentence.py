@@ -66,7 +66,7 @@ def _what_differs(c: Certificate) -> str:
     if c.rounding is not None and c.rounding > COARSE:
         return f"but the dials round so coarsely that {_differ(c)}"
     if c.shifts_for_good:
-        return "but after an output limit the two outputs stay apart for good"
+        return "but without integral action the new controller does not hold the output as the old one did, once it was at a limit"
     if c.scan_cost is not None and c.scan_cost.matters:
         return "what differs is how they are computed, scan by scan"
     assert c.scan_by_scan is not None

@@ -133,7 +133,7 @@ def _scan(c: Conversion) -> Iterator[str]:
             f"The scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: settings are per second, so do not scale the gain "
             "by their ratio"
         )
-    if c.request.compensate:
+    if c.certificate.compensated:
         yield (
             "The settings make up for scan intervals and rules: they are right for these intervals only, and rest on scan rules "
             "that are often only assumed"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _DIALS: Final = (Role.MULTIPLIER, Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 _NEAR: Final = 0.01
 """Deviation in the loop band below which the source's own numbers stand beside an exact match."""
-_FAR: Final = 0.2
+_FAR: Final = 0.05
 """Deviation in the loop band from which settings are not worth a line."""
 _DIGITS: Final = 4
 
@@ -152,7 +152,8 @@ def _absorbed(c: Conversion) -> Iterator[Beside]:
         request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
         found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
         off = found.certificate.feedback.loop_band.max_deviation
-        if off < _FAR:
+        turned = any(v.value < 0 for v in found.settings.values() if v.role is Role.DERIVATIVE)
+        if off < _FAR and not turned:
             text = f"without the lag, absorbed into the dials: {_dials(found.settings)}, {percent(off)}"
             yield Beside("absorbed", text, found.settings, "--match low-frequency")
 

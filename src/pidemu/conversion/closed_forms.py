@@ -90,7 +90,7 @@ class ClosedForms:
             There are none, or they leave the target's ranges.
         """
         if match == "low-frequency":
-            return self.low_frequency(), match
+            return self.low_frequency(moments=True), match
         why: NoMatchError | SettingError
         try:
             return self.exact(), "exact"
@@ -158,11 +158,12 @@ class ClosedForms:
             raise NoMatchError("no settings give the same law")
         return settings
 
-    def low_frequency(self) -> Settings:
+    def low_frequency(self, *, moments: bool = False) -> Settings:
         """Match the moments, with the filter as the target fixes it or as it is delivered.
 
         A filter that can be set takes the source's filter time where it costs more than 1 % in the loop band to leave it, and the
-        source's filter is documented, measured or inferred: an assumed one is not imitated, and neither is the lack of one.
+        source's filter is documented, measured or inferred: an assumed one is not imitated, and neither is the lack of one. With
+        that filter the source's own gain and integral may come nearer than the moments; with `moments` these are kept even so.
         """
         original = self.target.filter
         delivered = replace(original, free=False)
@@ -175,7 +176,7 @@ class ClosedForms:
         self.target.filter = original
         imitated = original.free and a.kd and a.Tf and filter_status(self.source) is not Status.ASSUMED
         if imitated and (settings is None or self.certify(settings).feedback.loop_band.max_deviation > _DEAR):
-            like_the_source = self._with_the_sources_filter()
+            like_the_source = self._with_the_sources_filter(moments=moments)
             if like_the_source is not None:
                 return like_the_source
         if settings is None:
@@ -184,15 +185,16 @@ class ClosedForms:
         self.target.filter = delivered
         return settings
 
-    def _with_the_sources_filter(self) -> Settings | None:
-        """Return what is nearest with the source's filter time: the same moments, or the source's own numbers."""
+    def _with_the_sources_filter(self, *, moments: bool) -> Settings | None:
+        """Return what is nearest with the source's filter time: the same moments or, where these may go, its own numbers."""
         found: list[Settings] = []
-        with suppress(NoMatchError, SettingError):
-            kept = self._gain_and_integral_kept()
-            if self.certify(kept).feedback.loop_band.max_deviation <= _DEAR:
-                return kept
-        with suppress(NoMatchError, SettingError):
-            found.append(self.own_numbers(filtered=True))
+        if not moments:
+            with suppress(NoMatchError, SettingError):
+                kept = self._gain_and_integral_kept()
+                if self.certify(kept).feedback.loop_band.max_deviation <= _DEAR:
+                    return kept
+            with suppress(NoMatchError, SettingError):
+                found.append(self.own_numbers(filtered=True))
         with suppress(NoMatchError, SettingError):
             found.append(self._with_filter(self.target.filter.nearest_to(*self._wanted_filter())))
         return min(found, key=lambda s: self.certify(s).feedback.loop_band.max_deviation, default=None)

@@ -193,12 +193,15 @@ def _forgetting(source: Settings, settings: Settings, request: Request, factor: 
     """Return why a target cannot hold what the source held at a limit; empty where it can, or where an integral makes up for it."""
     if not forgets(source, settings):
         return ""
+    reason = f"{settings.card.id} cannot hold the output of a loop without integral action"
+    if not settings.algorithm().velocity:
+        return f"{reason}: it has no place for a bias, and its output is 0 at SP = PV"
     from pidemu.certificate.limit_shift import limit_shift
 
     scans = request.scan or (common_interval(source, settings),) * 2
     on_the_block, _ = rounded(settings, request.digits or DIGITS, request.given)  # integer arithmetic runs nothing else
     shift = limit_shift(source, on_the_block, scans, factor)
-    return f"{settings.card.id} cannot hold the output of a loop without integral action. {shift.text}" if shift.refuses else ""
+    return f"{reason}. {shift.text}" if shift.refuses else ""
 
 
 def _that_hold(settings: Settings) -> tuple[str, ...]:

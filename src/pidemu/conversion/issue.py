@@ -26,16 +26,16 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
     emulate : bool
         Whether both controllers are emulated, for the points 3, 5 and 6.
     """
-    certificate = replace(work.certify(settings), scan_cost=work.scan_cost(settings), compensated=work.compensates)
+    certificate = replace(work.certify(settings), scan_cost=work.scan_cost(settings), compensated=work.is_bent)
     if settings != unrounded:
-        before = replace(work.certify(unrounded), compensated=work.compensates)
+        before = replace(work.certify(unrounded), compensated=work.is_bent)
         certificate = replace(
             certificate,
             feedback_before_rounding=before.headline,
             setpoint_before_rounding=before.setpoint_headline,
             setpoint_in_cascade=before.setpoint_in_cascade,
         )
-    if certificate.feedback_is_exact and not work.compensates:
+    if certificate.feedback_is_exact and not work.is_bent:
         certificate = replace(certificate, proof=prove(work.source, unrounded, work.factor, mode=work.mode, within=EXACT))
     if not emulate:
         return certificate

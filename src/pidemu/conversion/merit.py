@@ -53,12 +53,12 @@ class Merit:
         Whether what is not linear, such as a squared error, differs.
     forgets : bool
         Whether the target has no integral action and forgets at a limit where it was, which the source does not.
-    noisy : bool
-        Whether noise is more than 1.5 times the source's without the law being the same.
     verdict : int
         Class of the verdict.
     form : int
         How far the form is from the source's.
+    noisy : bool
+        Whether noise is more than 1.5 times the source's without the law being the same.
     by_number : bool
         Whether a term that the source does not have is switched off by a number, not by the structure.
     dials : int
@@ -85,9 +85,9 @@ class Merit:
     setpoint: int = 0
     nonlinear: bool = False
     forgets: bool = False
-    noisy: bool = False
     verdict: int = 0
     form: int = 0
+    noisy: bool = False
     by_number: bool = False
     dials: int = 0
     rules: bool = False
@@ -172,9 +172,20 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
 
 
 def forgets(source: Settings, target: Settings) -> bool:
-    """Whether a source that holds its output by a bias meets a target that counts from its last output, without integral action."""
-    a, b = source.algorithm(), target.algorithm()
-    return not (a.ki or b.ki or a.velocity) and b.velocity
+    """Whether a source that holds its output by a bias meets a target that does not, with no integral in either.
+
+    A velocity controller counts from its last output. One that loads the output into its integral, and clears that where nothing
+    is integrated, has no bias at all.
+    """
+    if source.algorithm().ki or target.algorithm().ki:
+        return False
+    return _holds_a_bias(source) and not _holds_a_bias(target)
+
+
+def _holds_a_bias(settings: Settings) -> bool:
+    a = settings.algorithm()
+    cleared = a.start == "load-output" and not a.keeps_integral and settings.by_role(Role.BIAS) is None
+    return not a.velocity and not cleared
 
 
 def setpoint_class(source: Algorithm, target: Algorithm) -> int:

@@ -53,7 +53,7 @@ class Answer:
         return {
             "value": self.value,
             "says": self.says,
-            "settings": to.get("settings"),
+            "settings": json_safe(to.get("settings")),
             "options": to.get("options"),
             "outcome": self.outcome,
             "command": self.command,

@@ -85,6 +85,8 @@ class Solver:
         self.filter_is_free = target.filter.free
         self.compensates = compensate and scans is not None
         """Whether targets are matched as a process sees them, sampled and held."""
+        self.is_bent = False
+        """Whether the settings found make up for the scans: where there is nothing to make up for, they are the plain ones."""
 
     def settings(self, aim: Aim) -> tuple[Settings, Match]:
         """Return the target's settings and how they were found.
@@ -95,6 +97,7 @@ class Solver:
             The target has no such settings.
         """
         self.target.filter = self.forms.original_filter  # a match fixes it
+        self.is_bent = False
         closed.check_terms(self.forms.scaled.algorithm, self.target)
         return self._by(aim)
 
@@ -183,8 +186,8 @@ class Solver:
         return self.continuous_deviation(settings)
 
     def continuous_deviation(self, settings: Settings) -> float:
-        """Return the largest deviation of the continuous feedback paths in the loop band."""
-        band = bands(self.law, max(self.scans) if self.scans else None, self.process)[0]
+        """Return the largest deviation of the continuous feedback paths in the loop band, wherever a scan interval would end it."""
+        band = bands(self.law, None, self.process)[0]  # plain settings do not depend on the scan intervals
         return deviation(self.law, settings.law(), band, self.factor)
 
     def distance(self, settings: Settings) -> float:
@@ -234,13 +237,22 @@ class Solver:
         """Return settings that make up for the scans, where that is asked for and brings them nearer; else the given ones."""
         if not self.compensates or self._runs_exactly(settings):
             return settings, how
+        bent = self._bent(settings)
+        runs_exactly = bent is not None and self._runs_exactly(bent)
+        if match == "exact" and not runs_exactly:
+            raise NoMatchError("no settings give the same law at these scan intervals and rules")
+        if bent is None:
+            return settings, how
+        self.is_bent = True
+        return bent, "exact" if runs_exactly else "low-frequency"
+
+    def _bent(self, settings: Settings) -> Settings | None:
+        """Return settings that make up for the scans; ``None`` where there are none that come nearer."""
         with suppress(NoMatchError, SettingError, ScanError):
             bent = self._through(self._met, settings, derivative=bool(self.forms.scaled.algorithm.kd))
             if self.deviation(bent) < self._deviation_if_stable(settings) * (1 - _CLEARLY) and self._keeps_signs(bent):
-                return bent, "low-frequency"
-        if match == "exact" and how != "exact":
-            raise NoMatchError("no settings give the same law at these scan intervals and rules")
-        return settings, how
+                return bent
+        return None
 
     def _keeps_signs(self, settings: Settings) -> bool:
         """Whether every term pushes the way the source's does: making up for scans never turns a derivative round."""

@@ -157,14 +157,17 @@ def _units(source: Settings) -> Iterator[Open]:
         number, unit = parse_quantity(value.typed)
         assert unit is not None
         readings = []
-        for text in (f"{number:g} {value.unit}", f"{number:g} {unit.name}/repeat"):
+        for text in (f"{number:g} {unit.name}/repeat", f"{number:g} {value.unit}"):  # the first is what the settings hold
             with_unit = source.changed({name: text})
             readings.append(Alternative(text, with_unit, {name: text}, f"{with_unit[name].to('s/repeat'):g} s per repeat"))
+        off = _apart(*(r.settings.law() for r in readings))
+        if off <= EXACT:  # once per minute is a minute
+            continue
         text = (
             f"{source.card.id}: {name} counts {_counts(value.unit)}, and was given as a time, {value.typed.strip()}. Is it "
             f"{readings[0].value} or {readings[1].value}?"
         )
-        yield Open("unit", name, readings[0], (readings[1],), asked=True, texts={"question": text})
+        yield Open("unit", name, readings[0], (readings[1],), asked=off > _ASKED, texts={"question": text})
 
 
 def _counts(unit: str) -> str:
