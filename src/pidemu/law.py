@@ -417,14 +417,10 @@ class Law:
     def kick(self) -> float:
         """Return the output step that a unit setpoint step makes at once [%/%]; infinite for an unfiltered derivative on error.
 
-        A lag on the output counts as fast where no derivative sees the setpoint: what is left after it. For the discrete law it is
-        the first sample.
+        Behind a lag on the output nothing moves at once. For the discrete law it is the first sample.
         """
         if self.scan is not None:
             return self.setpoint.num[0] / self.setpoint.den[0]
-        a = self.algorithm
-        if a.filter_on == "output" and a.Tf and not (a.kd and a.c) and a.dahlin is None:
-            return Law(replace(a, Tf=0.0)).kick()
         num, den = _trim(self.setpoint.num), _trim(self.setpoint.den)
         if len(num) > len(den):
             return math.copysign(math.inf, num[-1])

@@ -23,11 +23,14 @@ class Measure:
         The quantity; the word itself where it is unknown, empty where there is no unit.
     factor : Fraction
         One of this unit in the quantity's basic unit; of a temperature, its difference.
+    zero : Fraction
+        The zero of this unit in the quantity's basic unit: of degC, 273.15 K.
     """
 
     kind: Kind
     quantity: str
     factor: Fraction = Fraction(1)
+    zero: Fraction = Fraction(0)
 
     @property
     def is_raw(self) -> bool:
@@ -76,6 +79,7 @@ _PHYSICAL: Final[dict[str, _Sizes]] = {
     "angle": {"deg": 1},
     "concentration": {"ppm": 1, "ppb": "0.001"},
 }  # fmt: skip
+_ZEROS: Final = {"degC": Fraction("273.15"), "degF": Fraction("459.67") * Fraction(5, 9)}
 _RATES: Final[dict[str, _Sizes]] = {"speed": _LENGTHS, "mass flow": _MASSES, "volume flow": _VOLUMES}
 _SIGNALS: Final[dict[str, _Sizes]] = {
     "current": {"A": 1, "mA": "0.001"},
@@ -99,7 +103,9 @@ _TIME_WORDS: Final = {"sec": "s", "second": "s", "minute": "min", "hr": "h", "ho
 def _table() -> dict[str, Measure]:
     found = {word: Measure("count", "count") for word in _COUNTS}
     for quantity, sizes in _PHYSICAL.items():
-        found |= {name: Measure("physical", quantity, Fraction(size)) for name, size in sizes.items()}
+        found |= {
+            name: Measure("physical", quantity, Fraction(size), _ZEROS.get(name, Fraction(0))) for name, size in sizes.items()
+        }
     for quantity, sizes in _RATES.items():
         found |= {
             f"{name}/{time}": Measure("physical", quantity, Fraction(size) / Fraction(seconds))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Literal
 
+from pidemu.errors import SettingError
 from pidemu.quantities import Measure, measure_of
 from pidemu.ranges import SignalRange, Which, option_of
 
@@ -124,6 +125,61 @@ def relation(source: SignalRange | None, target: SignalRange | None, which: Whic
     if "none" in (a.kind, b.kind) and old.ends == new.ends:
         return Relation()  # a unit that one of them leaves out
     return _unless_alike(_which_of_two(which, (source, target), (old, new)))
+
+
+def in_target_units(x: float, source: SignalRange | None, target: SignalRange | None) -> float:
+    """Return what the target shows for a signal that the source shows: the same physical value, or the same point of the range.
+
+    Parameters
+    ----------
+    x : float
+        The signal [units of the source's range; %, where there is none].
+    source, target : SignalRange or None
+        The two ranges, related as by `relation`; where the target's is not given it has the source's.
+
+    Raises
+    ------
+    SettingError
+        One range is of a gauge pressure and the other one of an absolute pressure.
+
+    Examples
+    --------
+    >>> from pidemu.ranges import read_range
+    >>> in_target_units(150.0, read_range("0,300 degC"), read_range("0,600 degF"))
+    302.0
+    >>> in_target_units(8192.0, read_range("0,16384 counts"), read_range("0,400 degC"))
+    200.0
+    """
+    if source is None or target is None or source == target:
+        return x
+    old, new = _compared(source, target)
+    _refuse_gauge_and_absolute(old.unit, new.unit)
+    a, b = measure_of(old.unit), measure_of(new.unit)
+    if not (a.quantity == b.quantity and a.is_quantity):
+        return _point(float(x), source, target)
+    seen = Fraction(_point(float(x), source, old))
+    return _point(float((seen * a.factor + a.zero - b.zero) / b.factor), new, target)
+
+
+def _point(x: float, one: SignalRange, other: SignalRange) -> float:
+    """Return the point of another range that lies where `x` lies in the first."""
+    if one.ends == other.ends:
+        return x
+    part = (Fraction(x) - Fraction(one.low)) / (Fraction(one.high) - Fraction(one.low))
+    return float(Fraction(other.low) + part * (Fraction(other.high) - Fraction(other.low)))
+
+
+_GAUGE: Final = ("barg", "psig", "kpag")
+_ABSOLUTE: Final = ("bara", "psia", "kpaa")
+
+
+def _refuse_gauge_and_absolute(*units: str) -> None:
+    words = {unit.strip().casefold() for unit in units}
+    if words & set(_GAUGE) and words & set(_ABSOLUTE):
+        raise SettingError(
+            f"{' and '.join(units)} are a gauge and an absolute pressure, which are apart by the pressure of the atmosphere; give "
+            "both ranges as gauge or both as absolute pressures to carry over a setpoint"
+        )
 
 
 def _compared(source: SignalRange, target: SignalRange) -> tuple[SignalRange, SignalRange]:

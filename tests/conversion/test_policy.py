@@ -60,7 +60,7 @@ class TestModes:
         found = convert("fisher/provox", {"GAIN": 0.8, "RESET": 10}, "yokogawa/fieldbus-pid")
         assert found.verdicts == {"auto": "exact-feedback", "cascade": "exact"}
         assert found.verdict == "exact-feedback"
-        assert "in cascade also for setpoint changes, in automatic these differ" in found.sentence
+        assert "setpoint changes are the same in cascade and differ in automatic" in found.sentence
 
     def test_a_mode_that_is_not_one_is_refused(self) -> None:
         with pytest.raises(SettingError, match="mode is 'manual'; it is one of auto, cascade, both"):
@@ -294,6 +294,65 @@ class TestQuestions:
     def test_software_runs_with_its_documented_defaults(self) -> None:
         found = convert("arduino/pid", {"Kp": 2, "Ki": 0.1, "Kd": 0}, "generic/parallel")
         assert dials(found, "kp", "ki") == [2, 0.1]
+
+
+class TestWhatIsTakenForGranted:
+    """Found by a fresh user: what is assumed has to show, and a contradiction has no default."""
+
+    def test_an_assumed_mode_shows_and_its_verdict_is_for_that_mode(self) -> None:
+        found = convert("yokogawa/fieldbus-pid", {"GAIN": 0.6, "RESET": 8}, "emerson/deltav", scan=0.5, assume=True)
+        assert found.assumed == ("mode = auto",)
+        assert found.verdicts.keys() == {"auto"}
+
+    def test_where_both_modes_lead_to_the_same_dials_nothing_is_asked_and_both_count(self) -> None:
+        found = convert("yokogawa/fieldbus-pid", {"GAIN": 1.2, "RESET": 180, "RATE": 18}, "honeywell/udc", assume=True)
+        assert found.verdicts.keys() == {"auto", "cascade"}
+        assert found.assumed == ()
+
+    def test_an_assumed_range_shows(self) -> None:
+        found = pidemu.convert(
+            pidemu.load_card("arduino/pid").settings(Kp=2, Ki=0.1, Kd=0), "emerson/deltav", assume=True, action="reverse"
+        )
+        assert found.assumed == ("pv_range = 0 to 100", "op_range = 0 to 100")
+        assert found.sentence.startswith("Assuming pv_range = 0 to 100 and op_range = 0 to 100, which were not stated.")
+
+    def test_a_contradiction_is_asked_about_whatever_is_assumed(self) -> None:
+        found = asked("epics/epid", {"KP": -2, "KI": 0.1}, "generic/parallel", action="reverse", assume=True)
+        assert [q.kind for q in found.questions] == ["action"]
+
+    @pytest.mark.parametrize(("gain", "action"), [(1, "direct"), (-1, "reverse")])
+    def test_positive_feedback_is_refused(self, gain: float, action: str) -> None:
+        process = pidemu.Process.from_lags(gain, [100], delay=10)
+        with pytest.raises(SettingError, match="is positive feedback"):
+            convert("fisher/provox", PROVOX, "emerson/deltav", process=process, action=action)
+        other = "reverse" if action == "direct" else "direct"
+        found = convert("fisher/provox", PROVOX, "emerson/deltav", process=process, action=other)
+        assert found.certificate.loop is not None
+
+    def test_a_bias_is_said_to_be_unused_where_the_integral_does_its_work(self) -> None:
+        found = convert("fisher/provox", PROVOX, "emerson/deltav", bias=40)
+        assert "The bias of 40 % is not used: the integral action finds the output at SP = PV." in found.warnings
+
+    @pytest.mark.parametrize("limits", [(90, 10), (10, 10), (math.nan, 10)])
+    def test_limits_have_the_lower_one_first(self, limits: tuple[float, float]) -> None:
+        with pytest.raises(SettingError, match="give the lower limit first"):
+            convert("fisher/provox", PROVOX, "emerson/deltav", limits=limits)
+
+    def test_compensation_needs_the_scans(self) -> None:
+        with pytest.raises(SettingError, match="add --scan"):
+            convert("fisher/provox", PROVOX, "emerson/deltav", compensate=True)
+
+    def test_real_intervals_alone_are_those_computed_with(self) -> None:
+        found = convert("fisher/provox", PROVOX, "emerson/deltav", runs_every=(1, 0.1))
+        assert found.scan == (1, 0.1)
+        assert (found.request.pace, dials(found, "RESET")) == ((1, 1), [15])
+        assert any("Only the real intervals were stated" in w for w in found.warnings)
+
+    def test_another_reading_with_the_same_dials_and_another_verdict_stands_beside(self) -> None:
+        given = {"GAIN": 2, "RSET": 0.5, "RATE": 0.1, "MINorRPM": "MIN", "PBorGAIN": "GAIN"}
+        found = convert("honeywell/udc", given, "generic/standard", assume=True)
+        texts = [str(b) for b in found.beside if b.kind == "unstated"]
+        assert any("ALGO is not stated" in t for t in texts)
 
 
 class TestDigits:

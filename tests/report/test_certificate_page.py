@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pidemu.report.command import command_for
 
 import pidemu
 from pidemu.card.library import ENVIRONMENT

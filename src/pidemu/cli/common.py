@@ -105,11 +105,15 @@ class Scan(_StepType):
         if isinstance(value, float | tuple):
             return value
         try:
-            intervals = [float(x) for x in str(value).removesuffix("s").split(",")]
+            intervals = [seconds(x) for x in str(value).split(",")]
             if not 1 <= len(intervals) <= 2 or not all(math.isfinite(x) and x > 0 for x in intervals):
                 raise ValueError
-        except ValueError:
-            self.fail(f"'{value}' is not a scan interval; write seconds, such as 0.5, or 1,0.5 for source and target", param, ctx)
+        except (SettingError, ValueError):
+            self.fail(
+                f"'{value}' is not a scan interval; write seconds, such as 0.5, or a unit too, 500 ms; 1,0.5 for source and target",
+                param,
+                ctx,
+            )
         return intervals[0] if len(intervals) == 1 else (intervals[0], intervals[1])
 
 

@@ -61,7 +61,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option(
     "--runs-every",
     type=Scan(),
-    help="Interval at which the source, or source and target, are really executed, where it is not the one computed with [s].",
+    help="Interval at which the source, or source and target, are really executed, where that is not --scan [s].",
 )
 @click.option("--compensate", is_flag=True, help="With --scan: make up for scan intervals and rules that differ.")
 @click.option(
@@ -97,7 +97,10 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option("--to-pv-range", type=Range(), help="Measurement range of the target; by default the source's.")
 @click.option("--to-op-range", type=Range(), help="Output range of the target; by default the source's.")
 @click.option(
-    "--cut-over", "now", metavar="SP,PV,OP", help="Setpoint, measurement and output now: how to change over without a bump."
+    "--cut-over",
+    "now",
+    metavar="SP,PV,OP",
+    help="Setpoint, measurement and output now, as the old controller shows them: how to change over without a bump.",
 )
 @click.option(
     "--action",
@@ -152,8 +155,10 @@ def command(
     controllers are, and what will behave differently. Exit status 1 if something has to be answered first, or if the target
     refuses.
     """
-    if word is not None and card is not None:
+    if card is not None and (word is not None or "=" in card):
         values, card = (card, *values), None  # what stands first is a value then
+    if word is not None and assume:
+        raise click.UsageError("--assume does not go with --from, which chooses no reading; state what is meant")
     given = assignments(values)
     wanted = assignments(fixed, "NAME=VALUE after --set")
     loop = None

@@ -64,7 +64,7 @@ def _answer(reading: Reading, goal: Card, arguments: Mapping[str, Any], words: s
 def _result(reading: Reading, goal: Card, arguments: Mapping[str, Any]) -> Conversion | str:
     try:
         return convert(reading.settings, goal, **{**arguments, "assume": True})
-    except ConversionRefusedError as error:
+    except (ConversionRefusedError, QuestionError) as error:
         return str(error)
 
 

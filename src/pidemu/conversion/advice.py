@@ -41,6 +41,7 @@ def warnings_for(c: Conversion) -> Iterator[str]:
         *_counted_in_scans(c),
         *_multiplier(c),
         *(o.idle for o in c.opens),
+        _bias(c),
         *([f"The two were not run against each other: {c.certificate.not_emulated}"] if c.certificate.not_emulated else []),
         *_scan(c),
     )
@@ -68,6 +69,13 @@ def _counted_in_scans(c: Conversion) -> Iterator[str]:
         if counted and c.request.scan is None:
             names = ", ".join(counted)
             yield f"{s.card.id}: {names} in scans: taken at {s.scan:g} s, the card's interval; give the real one, --scan"
+
+
+def _bias(c: Conversion) -> str:
+    """Return that a bias was stated for nothing."""
+    if c.request.bias is None or not c.settings.algorithm().ki:
+        return ""
+    return f"The bias of {number(c.request.bias)} % is not used: the integral action finds the output at SP = PV"
 
 
 def _lag(c: Conversion) -> str:
@@ -126,6 +134,10 @@ def _multiplier(c: Conversion) -> Iterator[str]:
 def _scan(c: Conversion) -> Iterator[str]:
     if c.scan is None:
         return
+    if c.request.undeclared:
+        yield (
+            "Only the real intervals were stated, and the controllers are taken to compute with these; if they do not, add --scan"
+        )
     for what in c.settings.algorithm(scan=c.scan[1]).too_coarse(c.scan[1]):
         yield f"a scan interval of {c.scan[1]:g} s is long for {c.settings.card.id}: {what}"
     if c.scan[0] != c.scan[1]:

@@ -15,6 +15,7 @@ from pidemu.conversion.options import Attempt
 from pidemu.conversion.questions import Answer, Question
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.spans import range_questions, rescaling
+from pidemu.conversion.unstated import Alternative, Open
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
 from pidemu.range_relation import RangeQuestion
 from pidemu.settings import Settings
@@ -27,12 +28,18 @@ def ask(questions: Sequence[Question], source: Settings, card: Card, request: Re
     Raises
     ------
     QuestionError
-        There are questions.
+        There are questions; or one is about a contradiction, which no default settles.
     """
-    if questions and not request.assume:
+    if any(q.kind == "action" for q in questions) or (questions and not request.assume):
         raise QuestionError(
             [replace(q, readings=tuple(_worked_out(a, source, card, request) for a in q.readings)) for q in questions]
         )
+
+
+def taken_for_granted(questions: Sequence[Question], source: Settings) -> tuple[Open, ...]:
+    """Return what is taken where the user wants no questions: the first reading of each."""
+    first = [(q, q.readings[0]) for q in questions if q.readings]
+    return tuple(Open(q.kind, q.about, Alternative(answer.value, source, {}), asked=True) for q, answer in first)
 
 
 def _worked_out(answer: Answer, source: Settings, card: Card, request: Request) -> Answer:

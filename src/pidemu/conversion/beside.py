@@ -186,8 +186,10 @@ def _unstated(c: Conversion) -> Iterator[Beside]:
             request = replace(c.request, assume=True, digits=c.request.digits or _DIGITS + 1)
             with suppress(PidemuError):
                 found = converted(replace(other.settings, pace=1.0), c.settings.card, request, emulate=False)
-                if _is_another(c.settings, found.settings):
+                same = not _is_another(c.settings, found.settings)
+                if not same or found.verdict != c.verdict:
                     options = "".join(f", {n}={x}" for n, x in found.settings.options.items() if c.settings.options.get(n) != x)
                     stated = f"{o.about} is not stated and {o.taken.value} is taken"
-                    text = f"{stated}; with {other.value}: {_dials(found.settings)}{options}"
+                    dials = f"the same dials, {found.verdict}" if same else f"{_dials(found.settings)}{options}"
+                    text = f"{stated}; with {other.value}: {dials}"
                     yield Beside("unstated", text, found.settings, f"{o.about}={other.value}")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pidemu.action import switch_position
+from pidemu.action import carried_action, switch_position
 from pidemu.card.base import Form
 from pidemu.card.library import cards, load_card
 from pidemu.card.load import Card
@@ -15,7 +15,15 @@ from pidemu.certificate.models import Rounded
 from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
-from pidemu.conversion.asking import action_questions, ask, missing_ranges, mode_is_open, mode_question, scale_questions
+from pidemu.conversion.asking import (
+    action_questions,
+    ask,
+    missing_ranges,
+    mode_is_open,
+    mode_question,
+    scale_questions,
+    taken_for_granted,
+)
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.merit import forgets
@@ -33,7 +41,7 @@ from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.ranges import RangeGiven
 from pidemu.scan.build import Action
-from pidemu.settings import Settings, limits
+from pidemu.settings import Settings, limits, off_values
 from pidemu.units import Role
 
 if TYPE_CHECKING:
@@ -164,11 +172,15 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     opens = tuple(unstated(source))
     source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]
-    ask([*action_questions(source, request), *open_questions, *scale_questions(source, request)], source, card, request)
+    scales = scale_questions(source, request)
+    ask([*action_questions(source, request), *open_questions, *scales], source, card, request)
+    _refuse_positive_feedback(source, request)
     work = _Work(source, card, request, aim)
     ranking = work.ranking()
-    if mode_is_open(source, ranking, request):
-        ask(work.mode_question(), source, card, request)
+    modes = work.mode_question() if mode_is_open(source, ranking, request) else []
+    if modes:
+        ask(modes, source, card, request)
+        request = replace(request, mode="auto")
         ranking = work.ranking("auto")
     best, refusal, settings = ranking[0], "", ranking[0].settings
     if settings is None:
@@ -176,7 +188,9 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
         refusal += work.other_options()
         if settings is None:
             raise ConversionRefusedError(refusal)
-    ask(missing_ranges(source, settings), source, card, request)
+    ranges = missing_ranges(source, settings)
+    ask(ranges, source, card, request)
+    opens = (*opens, *taken_for_granted([*scales, *modes, *ranges], source))
     _refuse_two_intervals(source, settings, request)
     shift = "" if refusal else _forgetting(source, settings, request, work.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
@@ -211,9 +225,15 @@ def _that_hold(settings: Settings) -> tuple[str, ...]:
     choices = choices_that_hold(settings.card, settings.options)
     options = [f"--set {n}={x} makes {settings.card.id} positional" for choice in choices for n, x in choice.items()]
     vendor = settings.card.id.partition("/")[0]
-    blocks = [i for i in cards() if i.startswith(f"{vendor}/") and load_card(i).data.implementation == "positional"]
+    blocks = [i for i in cards() if i.startswith(f"{vendor}/") and _holds_a_bias(load_card(i))]
     named = f", such as {' or '.join(blocks)}" if blocks else ""
     return (*options, f"a positional block with a bias holds the output{named}; set the bias to the output at SP = PV")
+
+
+def _holds_a_bias(card: Card) -> bool:
+    """Whether a block is positional and its integral can be switched off."""
+    dial = next((s for s in card.data.settings.values() if s.sets == Role.INTEGRAL.value), None)
+    return card.data.implementation == "positional" and (dial is None or bool(off_values(dial)))
 
 
 def _concluded(
@@ -359,6 +379,19 @@ def _refuse_recursions(source: Settings, target: Card) -> None:
                 f"{card.id} cancels the pole of a process model and has no PID settings; tune the other card for that process "
                 f"instead"
             )
+
+
+def _refuse_positive_feedback(source: Settings, request: Request) -> None:
+    """Refuse a process whose sign contradicts the action: with it the loop runs away, and margins say nothing."""
+    action = request.action or carried_action(source)
+    if request.process is None or action is None:
+        return
+    needed = "reverse" if request.process.feedback_sign > 0 else "direct"
+    if action != needed:
+        raise SettingError(
+            f"{source.card.id}: {action} acting with the process {request.process.text} is positive feedback: the loop runs away. "
+            f"Turn the sign of the process gain, or of the action: this process needs {needed} acting"
+        )
 
 
 def _refuse_absurd_gains(source: Settings) -> None:

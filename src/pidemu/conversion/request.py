@@ -50,6 +50,8 @@ class Request:
         Output limits of the source, where they were stated [%, or the units that its card computes in].
     compensate, allow_approximate, assume : bool
         As in `convert`.
+    undeclared : bool
+        Whether only the real intervals were stated, so that they are taken to be computed with.
     """
 
     options: Mapping[str, object] = field(default_factory=dict)
@@ -69,6 +71,7 @@ class Request:
     allow_approximate: bool = False
     assume: bool = False
     tag: str = ""
+    undeclared: bool = False
 
     @property
     def declared(self) -> tuple[float, float] | None:
@@ -188,6 +191,8 @@ def read_request(
     chosen = {spelled.get(n.casefold(), n): x for n, x in named.items() if n.casefold() in spelled or n in (options or {})}
     dials = {n: x for n, x in named.items() if n.casefold() not in spelled and n not in (options or {})}
     real, pace = _intervals_of(scan, runs_every)
+    if compensate and real is None:
+        raise SettingError("compensate makes up for the scan intervals, which were not given; add --scan (scan= from Python)")
     return Request(
         options=chosen,
         given=dials,
@@ -201,27 +206,36 @@ def read_request(
         process=process,
         digits=checked_digits(digits),
         bias=bias,
-        limits=limits,
+        limits=_checked_limits(limits),
         compensate=compensate,
         allow_approximate=allow_approximate,
         assume=assume,
         tag=tag,
+        undeclared=scan is None and runs_every is not None,
     )
 
 
 def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float] | None, tuple[float, float]]:
     """Return the intervals at which both are executed [s], and these per the intervals they compute with.
 
-    An interval that is stated once only is taken for both. The target is timed rightly unless its own real
-    interval is given: it computes with its scan interval or, where none is given, with the one at which the source runs.
+    An interval that is stated once only is taken for both. The target is timed rightly unless its own real interval is given with
+    its scan interval: a scan interval that is not stated is the real one.
     """
     declared, real = (_one_or_two(x, name) for x, name in ((scan, "scan"), (runs_every, "runs_every")))
     if real is None:
         return (None if declared is None else (declared[0], declared[-1])), (1.0, 1.0)
-    source = real[0] if declared is None else declared[0]
-    target = declared[1] if declared is not None and len(declared) == 2 else real[0]
+    if declared is None:
+        return (real[0], real[-1]), (1.0, 1.0)
+    source = declared[0]
+    target = declared[1] if len(declared) == 2 else real[0]
     target_real = real[1] if len(real) == 2 else target
     return (real[0], target_real), (_ratio(real[0], source), _ratio(target_real, target))
+
+
+def _checked_limits(limits: tuple[float, float] | None) -> tuple[float, float] | None:
+    if limits is not None and not limits[0] < limits[1]:  # not a number compares false as well
+        raise SettingError(f"limits are {limits[0]:g} and {limits[1]:g}; give the lower limit first, such as 0,100")
+    return limits
 
 
 def _ratio(real: float, declared: float) -> float:

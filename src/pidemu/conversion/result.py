@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -228,7 +228,8 @@ class Conversion:
         Parameters
         ----------
         sp, pv, op : float
-            Setpoint, measurement and output at the cut-over [engineering units where the ranges are given, else %].
+            Setpoint, measurement and output at the cut-over, as the old controller shows them [the source's engineering units where
+            its range is given, else %]. Where the target has another range, the plan is in its units.
         action : {"reverse", "direct"}, optional
             Action of the loop in the ISA sense; needed where the plan depends on it and it is not known (see `action`).
 
@@ -237,12 +238,17 @@ class Conversion:
         ActionError
             What to set depends on the action, which is not known.
         ScanError
-            The action contradicts the sign of the gain, or the signals cannot be used.
+            The action contradicts the sign of the gain, or the signals cannot be used: not finite, or outside the ranges.
+        SettingError
+            One range is of a gauge pressure and the other one of an absolute pressure.
         """
+        from pidemu.cutover.old_signals import as_the_target_shows
         from pidemu.cutover.plan import transfer_plan
 
         scan = self.scan[1] if self.scan else None
-        return transfer_plan(self.settings, sp, pv, op, scan=scan, action=action or self.action)
+        signals, note = as_the_target_shows(self.source, self.settings, (sp, pv, op))
+        plan = transfer_plan(self.settings, *signals, scan=scan, action=action or self.action)
+        return replace(plan, notes=(note, *plan.notes)) if note else plan
 
     @property
     def assumptions(self) -> tuple[str, ...]:

@@ -1,0 +1,68 @@
+"""Setpoint, measurement and output at the cut-over: as the old controller shows them, and as the new one does."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Final
+
+from pidemu.certificate.figures import number
+from pidemu.errors import ScanError
+from pidemu.range_relation import in_target_units
+from pidemu.ranges import SignalRange
+from pidemu.settings import Settings
+
+Signals = tuple[float, float, float]
+"""Setpoint, measurement and output."""
+_NAMES: Final = ("setpoint", "measurement", "output")
+_BEYOND: Final = 10.0
+"""How far outside its range a signal can lie [% of span]: a transmitter saturates sooner."""
+
+
+def as_the_target_shows(source: Settings, target: Settings, signals: Signals) -> tuple[Signals, str]:
+    """Return the signals in the target's units, with a sentence where they are other numbers than the source's.
+
+    Parameters
+    ----------
+    source, target : Settings
+        The settings of both, with their ranges.
+    signals : tuple of float
+        Setpoint, measurement and output as the source shows them [units of its ranges; %, where there are none].
+
+    Raises
+    ------
+    ScanError
+        A signal is not a finite number or outside the source's range.
+    SettingError
+        One range is of a gauge pressure and the other one of an absolute pressure.
+    """
+    old = (source.pv_range, source.pv_range, source.op_range)
+    new = (target.pv_range, target.pv_range, target.op_range)
+    for name, x, given in zip(_NAMES, signals, old, strict=True):
+        _check(name, x, given)
+    sp, pv, op = (in_target_units(x, a, b) for x, a, b in zip(signals, old, new, strict=True))
+    if (sp, pv, op) == tuple(signals):
+        return signals, ""
+    shown = ", ".join(
+        f"{name} {_text(x, a)} is {_text(y, b)}"
+        for name, x, y, a, b in zip(_NAMES, signals, (sp, pv, op), old, new, strict=True)
+        if x != y
+    )
+    return (sp, pv, op), f"on the new controller, {shown}"
+
+
+def _check(name: str, x: float, given: SignalRange | None) -> None:
+    if not isfinite(x):
+        raise ScanError(f"the {name} {x} is not a finite number; give the one at the cut-over")
+    if given is None:
+        return
+    part = 100 * (x - given.low) / given.span
+    if not -_BEYOND <= part <= 100 + _BEYOND:
+        raise ScanError(
+            f"the {name} {_text(x, given)} is outside the old controller's range, {given}; give the signals at the cut-over as the "
+            "old controller shows them"
+        )
+
+
+def _text(x: float, given: SignalRange | None) -> str:
+    unit = "%" if given is None else given.unit
+    return f"{number(float(f'{x:.7g}'))} {unit}".rstrip()
