@@ -206,7 +206,9 @@ def _check(value: Value, written: object) -> None:
         off = off_values(setting)
         raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
-        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here")
+        off = off_values(setting)
+        does = f"; {off[0]:g} does" if off else ""
+        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here{does}")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
         off = off_values(setting)
         instead = f"{off[0]:g} switches it off" if off else "give the smallest value above zero, or another unit"

@@ -46,3 +46,15 @@ action: direct
     out = told("convert", "--loop", written(tmp_path, loop))
     assert "Action: direct acting, PV - SP: CA 1." in out
     assert [line.split()[1] for line in out.splitlines() if line.strip().startswith(("KP ", "KI ", "KD "))] == ["2", "0.1", "0.01"]
+
+
+def test_the_output_limits_and_the_bias_stand_in_the_file(tmp_path: Path) -> None:
+    loop = """\
+card: fisher/provox
+settings: {GAIN: 2, RESET: 4}
+to: emerson/deltav
+limits: [20, 80]
+action: reverse
+"""
+    out = told("convert", "--loop", written(tmp_path, loop))
+    assert "Output limits: set 20 to 80 %." in out

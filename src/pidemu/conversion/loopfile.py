@@ -38,6 +38,9 @@ class LoopFile(Model):
     mode: Literal["auto", "cascade", "both"] | None = Field(default=None, description="Which setpoint counts.")
     action: Literal["reverse", "direct"] | None = Field(default=None, description="Action of the loop.")
     bias: Number | None = Field(default=None, description="Output at SP = PV of a loop without integral action [%].")
+    limits: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="Output limits that the source is set to, the lower one first."
+    )
     tag: Text | None = Field(default=None, description="The loop's name.")
 
 
@@ -58,7 +61,7 @@ class Loop:
     to_pv_range, to_op_range : str or None
         The target's ranges, as they are written.
     others : dict
-        What else is given of the conversion's arguments: runs_every, mode, action, bias, tag.
+        What else is given of the conversion's arguments: runs_every, mode, action, bias, limits, tag.
     """
 
     card: str
@@ -97,6 +100,7 @@ def read_loop(file: Path) -> Loop:
         "mode": loop.mode,
         "action": loop.action,
         "bias": loop.bias,
+        "limits": loop.limits and (loop.limits[0], loop.limits[1]),
         "tag": loop.tag,
         "runs_every": _intervals(loop.runs_every),
     }
