@@ -7,12 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pidemu.action import carried_action, switch_position
-from pidemu.card.base import Form
-from pidemu.card.library import cards, load_card
+from pidemu.action import switch_position
+from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
-from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.aim import Aim, read_aim
 from pidemu.conversion.asking import (
@@ -26,12 +24,19 @@ from pidemu.conversion.asking import (
 )
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.merit import forgets
 from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
 from pidemu.conversion.questions import Question
-from pidemu.conversion.request import DIGITS, Request, read_request
+from pidemu.conversion.refusals import (
+    forgotten_output,
+    refuse_absurd_gains,
+    refuse_positive_feedback,
+    refuse_recursions,
+    refuse_two_intervals,
+    what_holds,
+)
+from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.solve import Solver
@@ -41,7 +46,7 @@ from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.ranges import RangeGiven
 from pidemu.scan.build import Action
-from pidemu.settings import Settings, limits, off_values
+from pidemu.settings import Settings, limits
 from pidemu.units import Role
 
 if TYPE_CHECKING:
@@ -49,8 +54,6 @@ if TYPE_CHECKING:
 
 _PAIRED = (None, "exact", "same-numbers")
 """Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
-_SMALLEST, _LARGEST = 1e-120, 1e120
-"""Gains beyond these are mistakes, and their squares leave the range of floating point."""
 
 
 def convert(
@@ -167,14 +170,14 @@ def convert(
 def converted(source: Settings, card: Card, request: Request, *, emulate: bool = True) -> Conversion:
     """Return the conversion that a request asks for; see `convert`."""
     aim = _aim(request.match, request.process)
-    _refuse_recursions(source, card)
-    _refuse_absurd_gains(source)
+    refuse_recursions(source, card)
+    refuse_absurd_gains(source)
     opens = tuple(unstated(source))
     source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]
     scales = scale_questions(source, request)
     ask([*action_questions(source, request), *open_questions, *scales], source, card, request)
-    _refuse_positive_feedback(source, request)
+    refuse_positive_feedback(source, request)
     work = _Work(source, card, request, aim)
     ranking = work.ranking()
     modes = work.mode_question() if mode_is_open(source, ranking, request) else []
@@ -191,49 +194,16 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     ranges = missing_ranges(source, settings)
     ask(ranges, source, card, request)
     opens = (*opens, *taken_for_granted([*scales, *modes, *ranges], source))
-    _refuse_two_intervals(source, settings, request)
-    shift = "" if refusal else _forgetting(source, settings, request, work.factor)
+    refuse_two_intervals(source, settings, request)
+    shift = "" if refusal else forgotten_output(source, settings, request, work.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
     if shift:
         conversion = replace(conversion, refusal=shift, certificate=replace(conversion.certificate, shifts_for_good=True))
     conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if conversion.refusal and not request.allow_approximate:
-        raise ConversionRefusedError(conversion.refusal, conversion, _that_hold(settings) if shift else ())
+        raise ConversionRefusedError(conversion.refusal, conversion, what_holds(settings) if shift else ())
     return conversion
-
-
-def _forgetting(source: Settings, settings: Settings, request: Request, factor: float) -> str:
-    """Return why a target cannot hold what the source held at a limit; empty where it can, or where an integral makes up for it."""
-    if not forgets(source, settings):
-        return ""
-    reason = f"{settings.card.id} cannot hold the output of a loop without integral action"
-    if not settings.algorithm().velocity:
-        return f"{reason}: it has no place for a bias, and its output is 0 at SP = PV"
-    from pidemu.certificate.limit_shift import limit_shift
-
-    scans = request.scan or (common_interval(source, settings),) * 2
-    on_the_block, _ = rounded(settings, request.digits or DIGITS, request.given)  # integer arithmetic runs nothing else
-    shift = limit_shift(source, on_the_block, scans, factor)
-    return f"{reason}. {shift.text}" if shift.refuses else ""
-
-
-def _that_hold(settings: Settings) -> tuple[str, ...]:
-    """Return what can hold the output of a loop without integral action."""
-    from pidemu.certificate.limit_shift import choices_that_hold
-
-    choices = choices_that_hold(settings.card, settings.options)
-    options = [f"--set {n}={x} makes {settings.card.id} positional" for choice in choices for n, x in choice.items()]
-    vendor = settings.card.id.partition("/")[0]
-    blocks = [i for i in cards() if i.startswith(f"{vendor}/") and _holds_a_bias(load_card(i))]
-    named = f", such as {' or '.join(blocks)}" if blocks else ""
-    return (*options, f"a positional block with a bias holds the output{named}; set the bias to the output at SP = PV")
-
-
-def _holds_a_bias(card: Card) -> bool:
-    """Whether a block is positional and its integral can be switched off."""
-    dial = next((s for s in card.data.settings.values() if s.sets == Role.INTEGRAL.value), None)
-    return card.data.implementation == "positional" and (dial is None or bool(off_values(dial)))
 
 
 def _concluded(
@@ -370,43 +340,6 @@ def _nearest(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | Non
         raise first.error or ConversionRefusedError("there are no options left to try")
     settings, refusal = first.solver.refused(first.error)
     return replace(first, match="constrained"), refusal, settings
-
-
-def _refuse_recursions(source: Settings, target: Card) -> None:
-    for card in (source.card, target):
-        if card.data.form is Form.DAHLIN:
-            raise ConversionRefusedError(
-                f"{card.id} cancels the pole of a process model and has no PID settings; tune the other card for that process "
-                f"instead"
-            )
-
-
-def _refuse_positive_feedback(source: Settings, request: Request) -> None:
-    """Refuse a process whose sign contradicts the action: with it the loop runs away, and margins say nothing."""
-    action = request.action or carried_action(source)
-    if request.process is None or action is None:
-        return
-    needed = "reverse" if request.process.feedback_sign > 0 else "direct"
-    if action != needed:
-        raise SettingError(
-            f"{source.card.id}: {action} acting with the process {request.process.text} is positive feedback: the loop runs away. "
-            f"Turn the sign of the process gain, or of the action: this process needs {needed} acting"
-        )
-
-
-def _refuse_absurd_gains(source: Settings) -> None:
-    a = source.algorithm()
-    for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
-        if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: {gain:g} is not a {name} gain that a controller has; check the settings")
-
-
-def _refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:
-    """Refuse to guess two scan intervals, where dials of both controllers count in scans."""
-    both = source.counts_scans and settings.counts_scans
-    if request.scan is None and both and source.scan != settings.scan:
-        cards = f"{source.card.id} and of {settings.card.id}"
-        raise SettingError(f"dials of {cards} count in scans; give both scan intervals, --scan H,H2")
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
