@@ -28,13 +28,16 @@ def after(text: str, title: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.split("  ") if cell.strip()] for line in lines if line.startswith("  ")]
 
 
+RULES = "INTEGRAL_RULE=backward, DERIVATIVE_RULE=backward"
+
+
 def test_differences_are_stated_overall_and_by_part_of_the_record() -> None:
     out = told("compare", *A, *B)
     assert out.splitlines()[:4] == [
         "standard record: 1360 scans, 1359 s; moves of 4 %, 40 s each",
         "  card                  scan  settings",
-        "  generic/standard       1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=1, c=1",
-        "  generic/standard (2)   1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=0.5, c=1",
+        "  generic/standard       1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=1, c=1, " + RULES,
+        "  generic/standard (2)   1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=0.5, c=1, " + RULES,
     ]
     parts = {row[0]: row[1:] for row in after(out, "Largest difference in each part of the record")}
     assert parts["setpoint steps"] == ["40 s", "160 s", "4"]  # 2 * (1 - 0.5) * 4 %

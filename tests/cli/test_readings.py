@@ -108,8 +108,10 @@ def test_descriptions_that_amount_to_the_same_stand_together(capsys: pytest.Capt
 
 def test_what_else_was_asked_for_is_passed_on(capsys: pytest.CaptureFixture[str]) -> None:
     found = pidemu.readings("fisher/provox", GAIN=2, RESET=0.75, pv_range=(0, 200), op_range=(0, 100))
-    err = refused(capsys, found, to_pv_range=(-50.0, 150.0), process=pidemu.Process.from_lags(2, [10]), compensate=True)[2]
+    err = refused(capsys, found, to_pv_range=(-50.0, 150.0), process=pidemu.Process.from_lags(2, [10]), scan=1.0, compensate=True)[
+        2
+    ]
     assert err.splitlines()[-1] == (
         '   pidemu convert fisher/provox GAIN=2 "RESET=0.75 min/repeat" --pv-range=0,200 --op-range=0,100 '
-        "--to emerson/deltav --to-pv-range=-50,150 --process gain=2,lag=10 --compensate"
+        "--to emerson/deltav --scan 1 --to-pv-range=-50,150 --process gain=2,lag=10 --compensate"
     )

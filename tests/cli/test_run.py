@@ -401,7 +401,9 @@ def test_json_holds_outputs_events_saturation_and_difference(folder: Path) -> No
     text = "sp,pv,auto,output\n50,50,1,40\n90,50,1,41\n90,nan,1,100\n90,50,0,30\n90,50,1,\n"
     status, out, err = recorded(folder, text, "--json")
     found = strict_json(out)
-    assert (status, found["card"], found["scan"], found["options"]) == (0, "generic/standard", 1.0, {})
+    assert (status, found["card"], found["scan"], found["options"]) == (
+        0, "generic/standard", 1.0, {"INTEGRAL_RULE": "backward", "DERIVATIVE_RULE": "backward"},
+    )  # fmt: skip
     assert found["settings"]["Ti"] == {"value": 10.0, "unit": "s"}
     assert found["outputs"] == pytest.approx([40, 100, 100, 30, 30])
     assert found["events"] == [

@@ -22,7 +22,7 @@ _EXAMPLE = 'write for example GAIN=2 or "RESET=20 s/repeat"'
 _RANGE = 'is not a range; write low and high with a unit, such as "0,400 degC"'
 _ENDS = "is not a range; give two finite numbers, low before high"
 _NUMBER = 'is not a number, nor a number with a unit such as "20 s/repeat"'
-_SCAN = "is not a scan interval; write seconds, such as 0.5, or 1,0.5 for source and target"
+_SCAN = "is not a scan interval; write seconds, such as 0.5, or a unit too, 500 ms; 1,0.5 for source and target"
 _LISTS = "'pidemu cards' lists them"
 
 

@@ -43,7 +43,7 @@ def settings(card: str | Card, **values: object) -> Settings:
 
 def convert(source: Settings, target: str | Card, **more: object) -> pidemu.Conversion:
     """Convert with compensation, which has to be asked for."""
-    return pidemu.convert(source, target, **{"emulate": False, "compensate": True, **more})  # type: ignore[arg-type]
+    return pidemu.convert(source, target, **{"emulate": False, "compensate": "scan" in more, **more})  # type: ignore[arg-type]
 
 
 def increments(s: Settings, h: float, scans: int) -> Floats:

@@ -151,7 +151,7 @@ def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
     asked: dict[str, Any] = {
         "options": {"FORM": "Standard"}, "given": {"ALPHA": 0.2}, "scan": (0.2, 0.5), "runs_every": (0.02, 0.5), "mode": "auto",
         "action": "direct", "to_pv_range": "0,200 degC", "to_op_range": "0,50 V = 0,100 %", "match": "low-frequency",
-        "process": Process.from_lags(0.8, lags=[20.0], delay=3), "compensate": True, "digits": 4, "allow_approximate": True,
+        "process": Process.from_lags(-0.8, lags=[20.0], delay=3), "compensate": True, "digits": 4, "allow_approximate": True,
         "assume": True, "tag": "TIC-101", "bias": 40.0, "limits": (5.0, 95.0),
     }  # fmt: skip
     request = pidemu.convert(source, "emerson/deltav", emulate=False, **asked).to_dict()["request"]
@@ -161,5 +161,5 @@ def test_everything_asked_is_in_it_by_the_names_of_the_arguments() -> None:
             "op_range": "0,50 V = 0,100 %", "lag_on_pv": 0.0,
         },
         "to": "emerson/deltav", **asked, "scan": [0.2, 0.5], "runs_every": [0.02, 0.5], "limits": [5.0, 95.0],
-        "process": "gain=0.8,lag=20,delay=3",
+        "process": "gain=-0.8,lag=20,delay=3",
     }  # fmt: skip

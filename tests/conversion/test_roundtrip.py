@@ -22,7 +22,7 @@ CORE = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 
 
 def to_itself(s: Settings, **given_: object) -> Conversion:
-    return pidemu.convert(s, s.card, options=s.options, given=given_, emulate=False)
+    return pidemu.convert(s, s.card, options=s.options, given=given_, assume=True, emulate=False)
 
 
 @pytest.mark.parametrize("card", ALL)
@@ -78,11 +78,11 @@ def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: st
     a = s.algorithm()
     assume(a.sp_filter is a.pv_filter is a.e_filter is None)  # the way back holds these, and the parallel form has none
     try:
-        there = pidemu.convert(s, "generic/parallel", emulate=False)
+        there = pidemu.convert(s, "generic/parallel", assume=True, emulate=False)
     except ConversionRefusedError:
         assume(False)
     assume(there.certificate.feedback.is_exact)
-    back = pidemu.convert(there.settings, s.card, options=s.options, given=uncomputed(s), emulate=False)
+    back = pidemu.convert(there.settings, s.card, options=s.options, given=uncomputed(s), assume=True, emulate=False)
     assert back.certificate.feedback.is_exact
     assert back.verdict in ("exact", "exact-feedback")
     if there.verdict == "exact" and has_distinct_times(s) and s.equation.proportional.on != "none":
@@ -107,8 +107,10 @@ def deviation(s: Settings, t: Settings, low: float, high: float) -> float:
 def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObject, names: tuple[str, str]) -> None:
     a = settings_that_act(data, pidemu.load_card(names[0]))
     try:
-        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])), mode="auto", emulate=False)
-        back = pidemu.convert(there.settings, a.card, options=a.options, given=uncomputed(a), mode="auto", emulate=False)
+        there = pidemu.convert(a, names[1], given=needed(pidemu.load_card(names[1])), mode="auto", assume=True, emulate=False)
+        back = pidemu.convert(
+            there.settings, a.card, options=a.options, given=uncomputed(a), mode="auto", assume=True, emulate=False
+        )
     except ConversionRefusedError:
         assume(False)
     bands = [c.certificate.feedback.loop_band for c in (there, back)]

@@ -24,6 +24,8 @@ from pidemu.units import Role
 
 _DEAR = 0.01
 """Deviation in the loop band from which leaving a filter as delivered costs too much."""
+_KEPT = 1e-6
+"""By how much moments may be off where they are to be kept: what the ends of a dial's range round."""
 _ROUNDING = 1e-6
 """Deviation that rounding may make of an exact match where its numbers nearly cancel."""
 
@@ -90,7 +92,10 @@ class ClosedForms:
             There are none, or they leave the target's ranges.
         """
         if match == "low-frequency":
-            return self.low_frequency(moments=True), match
+            found = self.low_frequency(moments=True)
+            if not self._has_the_moments(found, _KEPT):
+                raise NoMatchError("no settings keep the moments: with these options the target lacks a term")
+            return found, match
         why: NoMatchError | SettingError
         try:
             return self.exact(), "exact"
@@ -223,11 +228,14 @@ class ClosedForms:
 
     def _with_the_moments(self, settings: Settings) -> Settings:
         """Return the settings or, behind a filter that no closed form knows, such that have the moments."""
-        wanted = self.scaled.moments()
-        found = Law(self._as_matched(settings.algorithm())).moments()  # of the feedback path, which no mode changes
-        if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
+        if self._has_the_moments(settings, EXACT):
             return settings
         return self.through(lambda problem, _: meet(problem), settings)
+
+    def _has_the_moments(self, settings: Settings, within: float) -> bool:
+        wanted = self.scaled.moments()
+        found = Law(self._as_matched(settings.algorithm())).moments()  # of the feedback path, which no mode changes
+        return all(abs(x - y) <= within * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True))
 
     def _matched(self, moments: Sequence[float], filt: TargetFilter) -> Iterable[Numbers]:
         """Return the solutions of the low-frequency match, with a filter that was free set to the value it was fixed at."""

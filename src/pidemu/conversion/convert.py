@@ -46,8 +46,8 @@ from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.ranges import RangeGiven
 from pidemu.scan.build import Action
-from pidemu.settings import Settings, limits
-from pidemu.units import Role
+from pidemu.settings import Settings, Value, limits
+from pidemu.units import Role, from_canonical, parse_unit
 
 if TYPE_CHECKING:
     from pidemu.loop.process import Process
@@ -359,10 +359,18 @@ def _shared(source: Settings, target: Card) -> dict[str, object]:
     if source.card.id != target.id:
         return {}
     return {
-        n: v.value
+        n: _as_it_runs(v, source)
         for n, v in source.items()
         if v.active and (v.setting.scope == "module" or not is_computed(source.equation, n, v.role))
     }
+
+
+def _as_it_runs(v: Value, source: Settings) -> float:
+    """Return a dial that is kept, for a controller that is executed at the interval it computes with: times grow by the pace."""
+    if source.pace == 1 or v.off or parse_unit(v.unit).scans:
+        return v.value
+    power = 1 if v.role in (Role.FILTER_TIME, Role.TRACKING_TIME) else -1 if v.role in (Role.OUTPUT_RATE, Role.SETPOINT_RATE) else 0
+    return from_canonical(v.role, v.canonical * source.pace**power, parse_unit(v.unit), source.spans) if power else v.value
 
 
 def _textbook(solver: Solver) -> Textbook:

@@ -241,7 +241,12 @@ def _numbers(settings: Settings) -> list[float]:
 
 
 def _class(work: Solver, c: Certificate) -> int:
-    """Return the verdict's class; nearly exact counts as exact where the source's filter is only assumed or inferred."""
+    """Return the verdict's class; nearly exact counts as exact where the source's filter is only assumed or inferred.
+
+    Where the scans are made up for, the laws at these are what counts.
+    """
+    if work.compensates and c.feedback_at_scan is not None and not c.feedback_at_scan.is_exact:
+        return RANK["approximate"] + (c.feedback_at_scan.loop_band.max_deviation > _FAR)
     if c.verdict != "approximate" or c.feedback.is_exact:
         same = c.feedback.is_exact and c.setpoint.is_exact and (c.setpoint_in_cascade is None or c.setpoint_in_cascade.is_exact)
         return RANK["exact" if same else "exact-feedback"]

@@ -10,7 +10,7 @@ from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.merit import forgets
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.rounding import rounded
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.settings import Settings, off_values
 from pidemu.units import Role
 
@@ -29,7 +29,10 @@ def forgotten_output(source: Settings, settings: Settings, request: Request, fac
 
     scans = request.scan or (common_interval(source, settings),) * 2
     on_the_block, _ = rounded(settings, request.digits or DIGITS, request.given)  # integer arithmetic runs nothing else
-    shift = limit_shift(source, on_the_block, scans, factor)
+    try:
+        shift = limit_shift(source, on_the_block, scans, factor)
+    except ScanError:  # it cannot be run at this interval
+        return f"{reason}: it counts from its last output, so what a limit cuts off is lost"
     return f"{reason}. {shift.text}" if shift.refuses else ""
 
 

@@ -401,7 +401,7 @@ class Target:
         of_dial = parallel and self.filter.of != "derivative-time"
         time = n.kd / scale if of_dial else _over(n.kd, n.K)
         effective = self.filter.of == "effective-derivative" and not _is_zero(time)
-        return time / (1 + time * n.ki / n.K) if effective else time
+        return time / (1 + _over(time * n.ki, n.K)) if effective else time
 
     def algorithm_of(self, n: Numbers) -> Algorithm:
         """Return the target's algorithm for canonical numbers, which may be arrays, whether its dials can be set so or not."""
