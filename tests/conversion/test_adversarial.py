@@ -93,7 +93,13 @@ def test_whatever_Td_over_Ti_a_conversion_is_exact_or_costs_what_the_block_diagr
         own = apart(conversion, loop.low, loop.high)
         assert conversion.settings.law().moments()[0] == pytest.approx(2 / Ti)
         if reason:
-            assert any(w in reason for w in ("complex zeros", "no equivalent in this series form", "would have to be negative"))
+            assert any(
+                w in reason
+                for w in (
+                    "complex zeros", "no equivalent in this series form", "would have to be negative",
+                    "this series form with its filter needs",
+                )
+            )  # fmt: skip
         elif conversion.verdict != "approximate":
             # 1e-9 is what the verdict promises; the two ways to compute it differ by less than a tenth of that
             assert apart(conversion, loop.low, full.high) < 1.1e-9
@@ -233,13 +239,13 @@ def test_a_controller_without_integral_never_gets_one(target: str, kd: float) ->
         assert conversion is None
         return
     assert conversion is not None
-    # a velocity algorithm forgets at a limit where the output was: refused, with the dials beside
-    velocity = conversion.settings.algorithm().velocity
-    assert ("cannot hold the output of a loop without integral action" in reason) == velocity
-    assert bool(reason) == velocity
+    # a velocity algorithm forgets at a limit where the output was, and epid has no place for a bias: refused, with the dials beside
+    forgets = conversion.settings.algorithm().velocity or target == "epics/epid"
+    assert ("cannot hold the output of a loop without integral action" in reason) == forgets
+    assert bool(reason) == forgets
     assert conversion.settings.law().moments()[0] == 0
     if not kd:
-        assert conversion.verdict == ("approximate" if velocity else "exact")
+        assert conversion.verdict == ("approximate" if forgets else "exact")
         u = outputs(conversion.settings, np.full(400, 50.0), np.full(400, 51.0), 1.0)
         assert np.ptp(u[1:]) == 0  # four hundred scans with a standing error
 
@@ -252,7 +258,7 @@ def step_kick(s: Settings, h: float = 1.0) -> float:
 
 
 B_ON = {
-    "A": ("Setpoint steps: with the old controller the output jumps by",),
+    "A": ("Setpoint steps: with the old controller the output ",),
     "B": ("P acts on the error on the old controller and on the measurement on the new one",),
 }
 

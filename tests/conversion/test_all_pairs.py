@@ -86,7 +86,10 @@ def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
     alike = math.isclose(*h) and rules(conversion.source) == rules(conversion.settings)
     if not (claimed or alike):  # the same law; scan by scan the outputs are not said to be the same
         return
-    assert math.isclose(*h)
+    if not math.isclose(*h):  # only what has no memory is the same at two intervals
+        assert not (source.algorithm().ki)
+        assert not (source.algorithm().kd)
+        return
     sp, pv = random_signal(11, 120), random_signal(12, 120)
     if verdict == "exact-feedback":
         sp = np.full(120, 50.0)

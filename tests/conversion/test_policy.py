@@ -376,3 +376,12 @@ class TestOutsideCards:
         assert file.read_text(encoding="utf-8") != text
         with pytest.raises(pidemu.CardError, match=r"oven\.yaml:\d+:\d+:"):
             pidemu.load_card(file)
+
+
+class TestSentences:
+    def test_a_setpoint_path_that_differs_more_is_told_though_nothing_moves_at_once(self) -> None:
+        """The ideal TDC has its lag on the output: a setpoint step moves nothing at once, and P follows behind the lag."""
+        given = {"K": 2, "T1": 1, "T2": 0.2, "FORM": "ideal", "CTEQN": "B"}
+        found = convert("honeywell/tdc3000", given, "honeywell/udc", options={"ALGO": "B"})
+        assert found.certificate.setpoint_kick.source == found.certificate.setpoint_kick.target == 0
+        assert "Setpoint changes: the first move of the output is the same, what follows is not." in found.sentence

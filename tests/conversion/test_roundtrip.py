@@ -82,8 +82,14 @@ def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: st
     except ConversionRefusedError:
         assume(False)
     assume(there.certificate.feedback.is_exact)
-    back = pidemu.convert(there.settings, s.card, options=s.options, given=uncomputed(s), assume=True, emulate=False)
+    back = pidemu.convert(
+        there.settings, s.card, options=s.options, given=uncomputed(s), assume=True, allow_approximate=True, emulate=False
+    )
     assert back.certificate.feedback.is_exact
+    if back.refusal:  # the parallel form holds its output by a bias where there is no integral, and this block does not
+        assert not s.algorithm().ki
+        assert "cannot hold the output of a loop without integral action" in back.refusal
+        return
     assert back.verdict in ("exact", "exact-feedback")
     if there.verdict == "exact" and has_distinct_times(s) and s.equation.proportional.on != "none":
         assert back.verdict == "exact"

@@ -96,7 +96,14 @@ def _differ(c: Certificate) -> str:
 def _also(c: Certificate) -> str:
     kick = c.setpoint_kick
     same = kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=0.02)
-    return "" if same else f" Setpoint changes: {_kick(kick)}."
+    off, setpoint = (x.loop_band.max_deviation for x in (c.headline, c.setpoint_headline))
+    if same and not (setpoint > _WORSE and setpoint > 2 * off):
+        return ""
+    return f" Setpoint changes: {_kick(kick)}."
+
+
+_WORSE: Final = 0.1
+"""Deviation of the setpoint path from which it is worth a word beside the other path's."""
 
 
 def _setpoint(c: Certificate) -> str:

@@ -25,7 +25,7 @@ from pidemu.units import Role
 _DEAR = 0.01
 """Deviation in the loop band from which leaving a filter as delivered costs too much."""
 _KEPT = 1e-6
-"""By how much moments may be off where they are to be kept: what the ends of a dial's range round."""
+"""By how much the third moment may be off where it is to be kept: what the ends of a dial's range round."""
 _ROUNDING = 1e-6
 """Deviation that rounding may make of an exact match where its numbers nearly cancel."""
 
@@ -93,7 +93,8 @@ class ClosedForms:
         """
         if match == "low-frequency":
             found = self.low_frequency(moments=True)
-            if not self._has_the_moments(found, _KEPT):
+            (m0, m1, m2), (*_, reached) = self.scaled.moments(), self._moments(found)
+            if abs(reached - m2) > _KEPT * max(abs(m2), sizes((m0, m1, 0.0))[2]):
                 raise NoMatchError("no settings keep the moments: with these options the target lacks a term")
             return found, match
         why: NoMatchError | SettingError
@@ -228,14 +229,14 @@ class ClosedForms:
 
     def _with_the_moments(self, settings: Settings) -> Settings:
         """Return the settings or, behind a filter that no closed form knows, such that have the moments."""
-        if self._has_the_moments(settings, EXACT):
+        wanted, found = self.scaled.moments(), self._moments(settings)
+        if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
             return settings
         return self.through(lambda problem, _: meet(problem), settings)
 
-    def _has_the_moments(self, settings: Settings, within: float) -> bool:
-        wanted = self.scaled.moments()
-        found = Law(self._as_matched(settings.algorithm())).moments()  # of the feedback path, which no mode changes
-        return all(abs(x - y) <= within * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True))
+    def _moments(self, settings: Settings) -> tuple[float, float, float]:
+        """Return the moments of the feedback path, which no mode changes."""
+        return Law(self._as_matched(settings.algorithm())).moments()
 
     def _matched(self, moments: Sequence[float], filt: TargetFilter) -> Iterable[Numbers]:
         """Return the solutions of the low-frequency match, with a filter that was free set to the value it was fixed at."""
