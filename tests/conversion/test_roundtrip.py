@@ -78,12 +78,12 @@ def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: st
     a = s.algorithm()
     assume(a.sp_filter is a.pv_filter is a.e_filter is None)  # the way back holds these, and the parallel form has none
     try:
-        there = pidemu.convert(s, "generic/parallel", assume=True, emulate=False)
+        there = pidemu.convert(s, "generic/parallel", mode="auto", assume=True, emulate=False)
     except ConversionRefusedError:
         assume(False)
     assume(there.certificate.feedback.is_exact)
     back = pidemu.convert(
-        there.settings, s.card, options=s.options, given=uncomputed(s), assume=True, allow_approximate=True, emulate=False
+        there.settings, s.card, options=s.options, given=uncomputed(s), mode="auto", allow_approximate=True, emulate=False
     )
     assert back.certificate.feedback.is_exact
     if back.refusal:  # the parallel form holds its output by a bias where there is no integral, and this block does not

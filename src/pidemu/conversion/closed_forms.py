@@ -25,7 +25,7 @@ from pidemu.units import Role
 _DEAR = 0.01
 """Deviation in the loop band from which leaving a filter as delivered costs too much."""
 _KEPT = 1e-6
-"""By how much the third moment may be off where it is to be kept: what the ends of a dial's range round."""
+"""By how much moments may be off where they are to be kept: what the ends of a dial's range round."""
 _ROUNDING = 1e-6
 """Deviation that rounding may make of an exact match where its numbers nearly cancel."""
 
@@ -93,8 +93,7 @@ class ClosedForms:
         """
         if match == "low-frequency":
             found = self.low_frequency(moments=True)
-            (m0, m1, m2), (*_, reached) = self.scaled.moments(), self._moments(found)
-            if abs(reached - m2) > _KEPT * max(abs(m2), sizes((m0, m1, 0.0))[2]):
+            if not self._keeps_the_moments(found):
                 raise NoMatchError("no settings keep the moments: with these options the target lacks a term")
             return found, match
         why: NoMatchError | SettingError
@@ -233,6 +232,12 @@ class ClosedForms:
         if all(abs(x - y) <= EXACT * size for x, y, size in zip(wanted, found, sizes(wanted), strict=True)):
             return settings
         return self.through(lambda problem, _: meet(problem), settings)
+
+    def _keeps_the_moments(self, settings: Settings) -> bool:
+        wanted, found = self.scaled.moments(), self._moments(settings)
+        m0, m1, _ = wanted
+        size = [max(x, y) for x, y in zip(sizes(wanted), sizes((m0, m1, 0.0)), strict=True)]  # m2 can be 0 but for rounding
+        return all(abs(x - y) <= _KEPT * s for x, y, s in zip(wanted, found, size, strict=True))
 
     def _moments(self, settings: Settings) -> tuple[float, float, float]:
         """Return the moments of the feedback path, which no mode changes."""
