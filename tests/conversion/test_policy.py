@@ -297,7 +297,7 @@ class TestQuestions:
 
 
 class TestWhatIsTakenForGranted:
-    """Found by a fresh user: what is assumed has to show, and a contradiction has no default."""
+    """What is assumed has to show, and a contradiction has no default."""
 
     def test_an_assumed_mode_shows_and_its_verdict_is_for_that_mode(self) -> None:
         found = convert("yokogawa/fieldbus-pid", {"GAIN": 0.6, "RESET": 8}, "emerson/deltav", scan=0.5, assume=True)
