@@ -195,7 +195,13 @@ def test_wrong_usage_is_said_with_the_usage_and_status_2(line: str, expected: tu
     assert said(*words(line)) == Said(2, "", usage(*expected))
 
 
-@pytest.mark.parametrize("scan", ["0", "-1", "a", "nan", "inf", "1,2,3", "1,", "", "500_ms"])
+def test_a_scan_interval_may_have_a_unit() -> None:
+    with_unit, plain = (said("convert", *_PI.split(), *_TO.split(), "--scan", scan) for scan in ("500 ms,1 s", "0.5,1"))
+    assert with_unit == plain
+    assert with_unit.status == 0
+
+
+@pytest.mark.parametrize("scan", ["0", "-1", "a", "nan", "inf", "1,2,3", "1,", "", "500_parsec"])
 def test_a_scan_interval_that_is_none_is_refused(scan: str) -> None:
     [scan] = words(scan) or [""]
     message = usage("convert", f"Invalid value for '--scan': '{scan}' {_SCAN}")
