@@ -228,6 +228,8 @@ COARSE: Final = 1e-3
 """What rounding may cost in the loop band before it counts against the verdict."""
 LEAST_PHASE: Final = 1.0
 """Phase that may be lost to a scan without a word in the verdict [deg]."""
+_NEARLY: Final = 0.1
+"""Deviation of the setpoint path in the loop band up to which a first move that comes late is not another setpoint response."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,6 +330,12 @@ class Certificate:
     def setpoint_headline(self) -> PathComparison:
         """The setpoint path that counts, likewise; in the first of the modes looked at."""
         return (self.compensated and self.setpoint_at_scan) or self.setpoint
+
+    @property
+    def only_a_lag_apart(self) -> bool:
+        """Whether a setpoint step moves one output at once and the other one behind a short lag, and the paths are near."""
+        kick, band = self.setpoint_kick, self.setpoint_headline.loop_band
+        return 0 in (kick.source, kick.target) and kick.source != kick.target and band.max_deviation <= _NEARLY
 
     @property
     def is_bent(self) -> bool:
