@@ -47,6 +47,9 @@ CONVERSIONS: dict[str, tuple[str, ...]] = {
     "options and dials of the target": (
         "fisher/provox", "GAIN=2", "RESET=4", "--to", "emerson/deltav", "--set", "FORM=Standard", "--set", "ALPHA=0.2",
     ),
+    "a filter taken into the dials beside": (
+        "yokogawa/fieldbus-pid", "GAIN=2", "RESET=60", "RATE=10", "PV_FTIME=2", "--mode", "auto", "--to", "fisher/provox",
+    ),
     "a match by name": (
         "generic/standard", "K=2", "Ti=30", "Td=2", "Tf=0.2", "--to", "fisher/provox", "--match", "frequency:0.07rad/s",
     ),

@@ -24,7 +24,6 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.card.library import ENVIRONMENT
 from pidemu.certificate.models import Band
-from pidemu.conversion.command import command_for
 from pidemu.conversion.convert import convert
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.statement import condition_line, sections
@@ -498,7 +497,7 @@ def test_the_command_on_the_page_gives_the_same_settings(name: str) -> None:
 def test_the_command_gives_what_was_asked_for_beside_the_settings(name: str) -> None:
     card, values, target, how = ASKED[name]
     c = convert(pidemu.load_card(card).settings(values), target, emulate=False, digits=5, **how)
-    command = command_for(c)
+    command = c.command
     found = _from_the_command(command)
     assert found["from"] == c.source.to_dict() | {"settings": found["from"]["settings"]}
     assert found["to"]["options"] == c.settings.options
@@ -513,7 +512,7 @@ def test_a_card_in_a_file_is_named_by_its_file(folder: Path) -> None:
     text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
     (folder / "acme" / "own block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     c = convert(pidemu.load_card("acme/own block.yaml").settings(SERIES), "generic/standard", digits=5)
-    command = command_for(c)
+    command = c.command
     assert command.startswith("pidemu convert 'acme/own block.yaml' K=2 ")
     assert _from_the_command(command)["to"] == c.to_dict()["to"]
 

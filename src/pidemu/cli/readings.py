@@ -46,7 +46,7 @@ def refuse_to_choose(
     SystemExit
         Always, with status 1.
     """
-    words = command_line(["--to", to, *_request_words(goal, arguments)])
+    words = command_line(["--to", to, *read_request(goal, **arguments).words()])
     answers = tuple(_answer(reading, goal, arguments, words) for reading in found)
     text = f"these settings can be read in {len(found)} ways. {_how_far(apart(found))} Which is meant?"
     names = {r.settings.card.id for r in found}
@@ -75,15 +75,3 @@ def _how_far(far: Apart) -> str:
         return f"Their integral gains are apart by a factor of up to {far.integral:.3g}."
     deviation = f"up to {number(float(f'{100 * far.deviation:.2g}'))} %" if far.deviation < 10 else "over 1000 %"
     return f"Their integral gains are the same; their laws for measurement differ by {deviation} in the loop band."
-
-
-def _request_words(goal: Card, arguments: Mapping[str, Any]) -> list[str]:
-    """Return what else was asked of the conversion as words of the command line."""
-    asked = {
-        "options": None, "given": None, "scan": None, "runs_every": None, "mode": "both", "action": None, "match": None,
-        "to_pv_range": None, "to_op_range": None, "process": None, "digits": None, "bias": None, "limits": None,
-        "compensate": False,
-        "allow_approximate": False, "assume": False, "tag": "",
-    }  # fmt: skip
-    given = {n: x for n, x in arguments.items() if n in asked}
-    return list(read_request(goal, **{**asked, **given}).words())

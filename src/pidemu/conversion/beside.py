@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pidemu.certificate.figures import number, percent
 from pidemu.certificate.models import EXACT, LEAST_PHASE, RANK
@@ -19,6 +19,7 @@ from pidemu.units import Role
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
 
+Kind = Literal["runner-up", "same-numbers", "matched", "absorbed", "compensated", "unstated"]
 _DIALS: Final = (Role.MULTIPLIER, Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 _NEAR: Final = 0.01
 """Deviation in the loop band below which the source's own numbers stand beside an exact match."""
@@ -43,7 +44,7 @@ class Beside:
         How to get them: words of the command line.
     """
 
-    kind: str
+    kind: Kind
     text: str
     settings: Settings
     how: str = ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
@@ -13,14 +12,6 @@ from pidemu.errors import PidemuError
 from pidemu.plain import exactly
 from pidemu.ranges import RANGES, option_of
 from pidemu.settings import Settings
-
-if TYPE_CHECKING:
-    from pidemu.conversion.result import Conversion
-
-
-def command_for(c: Conversion) -> str:
-    """Return the ``pidemu convert`` command that gives the same settings, for a shell."""
-    return words_for(c.source, c.settings.card, c.request)
 
 
 def words_for(source: Settings, target: Card, request: Request) -> str:

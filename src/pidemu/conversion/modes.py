@@ -14,7 +14,6 @@ Mode = Literal["auto", "cascade"]
 Modes = Literal["auto", "cascade", "both"]
 MODES: Final[tuple[Mode, Mode]] = get_args(Mode)
 CHOICES: Final[tuple[Modes, ...]] = get_args(Modes)
-WORDS: Final[dict[Mode, str]] = {"auto": "in automatic", "cascade": "in cascade"}
 
 
 def read_mode(mode: object) -> Modes:

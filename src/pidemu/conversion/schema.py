@@ -16,6 +16,7 @@ from pidemu.certificate import models
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.proof import Proof
 from pidemu.conversion.aim import Match
+from pidemu.conversion.beside import Kind as BesideKind
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.questions import Kind
 
@@ -131,7 +132,7 @@ class ConditionPart(Part):
 class BesidePart(Part):
     """Other settings of the target, beside the answer."""
 
-    kind: Literal["runner-up", "same-numbers", "matched", "compensated", "unstated"]
+    kind: BesideKind
     text: str
     to: Side
     how: str = Field(description="Words of the command line that give them.")
