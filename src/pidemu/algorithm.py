@@ -357,6 +357,11 @@ class Algorithm:
         )
 
     @property
+    def in_cascade(self) -> Algorithm:
+        """The algorithm with what P sees in cascade (specs/equations.md, section 6)."""
+        return self if self.cascade_b is None else replace(self, b=self.cascade_b)
+
+    @property
     def linear(self) -> Algorithm:
         """The algorithm without what the linear law leaves out."""
         return replace(

@@ -414,14 +414,16 @@ class Law:
             out.append(value / den[0])
         return tuple(out)
 
-    def kick(self) -> float:
-        """Return the output step that a unit setpoint step makes at once [%/%]; infinite for an unfiltered derivative on error.
+    def kick(self, path: PathName = "setpoint") -> float:
+        """Return the output step that a unit step of setpoint or measurement makes at once [%/%].
 
-        Behind a lag on the output nothing moves at once. For the discrete law it is the first sample.
+        It is infinite where a derivative without filter sees the step. Behind a lag on the output nothing moves at once. For the
+        discrete law it is the first sample.
         """
+        r = self.path(path)
         if self.scan is not None:
-            return self.setpoint.num[0] / self.setpoint.den[0]
-        num, den = _trim(self.setpoint.num), _trim(self.setpoint.den)
+            return r.num[0] / r.den[0]
+        num, den = _trim(r.num), _trim(r.den)
         if len(num) > len(den):
             return math.copysign(math.inf, num[-1])
         return num[-1] / den[-1] if len(num) == len(den) else 0.0

@@ -181,7 +181,7 @@ def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None
 
 def in_mode(a: Algorithm, path: PathName) -> Algorithm:
     """Return the algorithm with the setpoint weight of the mode that a path is of."""
-    return replace(a, b=a.cascade_b) if path == "setpoint in cascade" and a.cascade_b is not None else a
+    return a.in_cascade if path == "setpoint in cascade" else a
 
 
 def exact_paths(a: Algorithm, names: Sequence[PathName], factor: Exact | int = 1) -> dict[PathName, ExactLaw]:

@@ -228,6 +228,8 @@ COARSE: Final = 1e-3
 """What rounding may cost in the loop band before it counts against the verdict."""
 LEAST_PHASE: Final = 1.0
 """Phase that may be lost to a scan without a word in the verdict [deg]."""
+_ALIKE: Final = 0.02
+"""Relative difference of first moves that is not worth a word."""
 _NEARLY: Final = 0.1
 """Deviation of the setpoint path in the loop band up to which a first move that comes late is not another setpoint response."""
 
@@ -332,10 +334,12 @@ class Certificate:
         return (self.compensated and self.setpoint_at_scan) or self.setpoint
 
     @property
-    def only_a_lag_apart(self) -> bool:
-        """Whether a setpoint step moves one output at once and the other one behind a short lag, and the paths are near."""
+    def moves_alike_at_once(self) -> bool:
+        """Whether a setpoint step moves both outputs alike at once, or one behind a short lag only, so that the paths are near."""
         kick, band = self.setpoint_kick, self.setpoint_headline.loop_band
-        return 0 in (kick.source, kick.target) and kick.source != kick.target and band.max_deviation <= _NEARLY
+        if kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=_ALIKE):
+            return True
+        return 0 in (kick.source, kick.target) and band.max_deviation <= _NEARLY
 
     @property
     def is_bent(self) -> bool:

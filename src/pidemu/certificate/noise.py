@@ -82,10 +82,7 @@ def noise_gain(settings: Settings, scan: float | None = None) -> float:
     law = settings.law(scan)
     if scan is not None:
         return float(np.max(np.abs(law.impulse(_SAMPLES))))
-    num, den = (np.trim_zeros(np.asarray(p, dtype=float), "b") for p in (law.feedback.num, law.feedback.den))
-    if num.size > den.size:
-        return math.inf
-    return float(abs(num[-1] / den[-1])) if num.size == den.size and num.size else 0.0
+    return abs(law.kick("feedback"))
 
 
 def noise_change(source: Settings, target: Settings, scans: tuple[float, float] | None = None, factor: float = 1.0) -> NoiseChange:

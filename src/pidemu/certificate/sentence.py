@@ -94,12 +94,10 @@ def _differ(c: Certificate) -> str:
 
 
 def _also(c: Certificate) -> str:
-    kick = c.setpoint_kick
-    same = kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=0.02) or c.only_a_lag_apart
     off, setpoint = (x.loop_band.max_deviation for x in (c.headline, c.setpoint_headline))
-    if same and not (setpoint > _WORSE and setpoint > 2 * off):
+    if c.moves_alike_at_once and not (setpoint > _WORSE and setpoint > 2 * off):
         return ""
-    return f" Setpoint changes: {_kick(kick)}."
+    return f" Setpoint changes: {_kick(c.setpoint_kick)}."
 
 
 _WORSE: Final = 0.1

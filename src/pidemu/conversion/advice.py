@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from pidemu.certificate.figures import number, percent
-from pidemu.certificate.models import Kick
 from pidemu.certificate.noise import noise_change
 from pidemu.conversion.modes import Mode, in_mode
 from pidemu.conversion.spans import range_questions, rescaling, signals_note
@@ -99,7 +98,7 @@ def _setpoint(c: Conversion) -> Iterator[str]:
     mode: Mode = "cascade" if c.request.mode == "cascade" else "auto"
     old, new = (in_mode(s.algorithm(), mode) for s in (c.source, c.settings))
     lost, gained = old.kp and old.b and not new.b, new.kp and new.b and not old.b
-    if not (_alike(kick) or c.certificate.only_a_lag_apart):
+    if not c.certificate.moves_alike_at_once:
         yield f"Setpoint steps: with the old controller the output {_jumps(kick.source)}, with the new one it {_jumps(kick.target)}"
     if lost:
         yield (
@@ -115,10 +114,6 @@ def _jumps(kick: float) -> str:
     if math.isinf(kick):
         return "spikes for one scan (unfiltered derivative on the error)"
     return f"jumps by {kick:.4g} % per % at once" if kick else "does not jump"
-
-
-def _alike(kick: Kick) -> bool:
-    return kick.source == kick.target or math.isclose(kick.source, kick.target, rel_tol=0.02)
 
 
 def _multiplier(c: Conversion) -> Iterator[str]:

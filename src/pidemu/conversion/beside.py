@@ -109,9 +109,8 @@ def _dials(s: Settings) -> str:
 
 def stands_beside(c: Conversion) -> Iterator[Beside]:
     """Yield the other settings worth a line: the runner-up, own numbers, the match, settings compensated for the scans."""
-    other = runner_up(c)
-    if other is not None:
-        yield other
+    if c.runner_up is not None:
+        yield c.runner_up
     yield from _own_numbers(c)
     yield from _matched(c)
     yield from _absorbed(c)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final, Literal, get_args
 
 from pidemu.algorithm import Algorithm
@@ -32,7 +31,7 @@ def read_mode(mode: object) -> Modes:
 
 def in_mode(a: Algorithm, mode: Mode) -> Algorithm:
     """Return the algorithm as it is in one mode: some change the setpoint weight of P in cascade (specs, section 6)."""
-    return a if mode == "auto" or a.cascade_b is None else replace(a, b=a.cascade_b)
+    return a if mode == "auto" else a.in_cascade
 
 
 def depends_on_mode(settings: Settings) -> bool:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pidemu.action import action_line, action_words, carried_action
+from pidemu.action import ACTIONS, action_line, action_words, carried_action
 from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
@@ -205,7 +205,7 @@ class Conversion:
     def action_text(self) -> str:
         """What the target's action has to be set to, with the error formula; for both actions where it is not known."""
         known = self.action
-        both: tuple[Action, ...] = ("reverse", "direct") if known is None else (known,)
+        both = ACTIONS if known is None else (known,)
         return "; ".join(self._action_words(a) for a in both)
 
     def _old_action(self) -> str:

@@ -12,8 +12,8 @@ from pidemu.errors import ScanError
 from pidemu.explanation.dials import dials_of, not_stated, ranges_missing
 from pidemu.explanation.forms import Forms, Times, forms_of
 from pidemu.explanation.model import Explanation, FilterFacts, Mode
-from pidemu.explanation.responses import in_cascade, ramp_of, responses_of
-from pidemu.explanation.words import action_words, summary_of
+from pidemu.explanation.responses import ramp_of, responses_of
+from pidemu.explanation.words import action_sentence, summary_of
 from pidemu.loop.open_loop import low_frequency_sign
 from pidemu.settings import Settings
 from pidemu.unverified import facts, unverified_law
@@ -70,7 +70,7 @@ def explain(settings: Settings, scan: float | None = None) -> Explanation:
         forms=forms,
         filters=tuple(_filters(settings, a, forms)),
         automatic=_mode(a, h),
-        cascade=_mode(in_cascade(a), h),
+        cascade=_mode(a.in_cascade, h),
         ramp=None if dahlin else ramp_of(a),
         reverse_with_gains=_reverse_with_gains(settings, a),
         beyond=tuple(settings.algorithm(own_units=True, scan=scan).beyond_the_law),
@@ -78,7 +78,7 @@ def explain(settings: Settings, scan: float | None = None) -> Explanation:
         notes=settings.notes,
         rests_on=facts(unverified_law(settings, rules=scan is not None, action=True)),
     )
-    found = replace(found, action=action_words(settings, found.reverse_with_gains))
+    found = replace(found, action=action_sentence(settings, found.reverse_with_gains))
     return replace(found, summary="\n".join(summary_of(found, a)))
 
 

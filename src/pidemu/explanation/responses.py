@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pidemu.algorithm import Algorithm
 from pidemu.law import Law
-from pidemu.rational import Rational
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +46,6 @@ class Ramp:
     slope: float
 
 
-def in_cascade(a: Algorithm) -> Algorithm:
-    """Return the algorithm with what P sees in cascade."""
-    return a if a.cascade_b is None else replace(a, b=a.cascade_b)
-
-
 def responses_of(a: Algorithm, scan: float | None = None) -> Responses:
     """Return what the output does at once.
 
@@ -70,12 +64,11 @@ def responses_of(a: Algorithm, scan: float | None = None) -> Responses:
         The algorithm is a recursion in scans, and no interval is given.
     """
     law = Law(a, scan)
+    kick = law.kick("feedback")
     if scan is None:
-        kick = _at_once(law.feedback)
         return Responses(kick, law.kick(), abs(kick) or _beyond_the_corner(law))
     fastest = math.pi / scan * (1 - 1e-9)
-    first = law.feedback.num[0] / law.feedback.den[0]
-    return Responses(first, law.kick(), float(abs(law.response(fastest))))
+    return Responses(kick, law.kick(), float(abs(law.response(fastest))))
 
 
 def ramp_of(a: Algorithm) -> Ramp:
@@ -93,17 +86,3 @@ def _beyond_the_corner(law: Law) -> float:
     ]
     fastest = min((t for t in times if t), default=0.0)
     return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0
-
-
-def _at_once(r: Rational) -> float:
-    num, den = _trimmed(r.num), _trimmed(r.den)
-    if len(num) > len(den):
-        return math.copysign(math.inf, num[-1])
-    return num[-1] / den[-1] if len(num) == len(den) else 0.0
-
-
-def _trimmed(coefficients: tuple[float, ...]) -> list[float]:
-    found = list(coefficients)
-    while len(found) > 1 and found[-1] == 0:
-        found.pop()
-    return found

@@ -144,7 +144,7 @@ def _setpoint_step(e: Explanation, mode: Mode) -> str:
     return f"{step} moves {_output(e, 10 * kick)} at once"
 
 
-def action_words(settings: Settings, reverse: bool | None) -> str:
+def action_sentence(settings: Settings, reverse: bool | None) -> str:
     """Return which way the output moves, by the error formula and in the vendor's words.
 
     Parameters
