@@ -25,10 +25,11 @@ _LOOP_ROWS: Final = (
 )
 
 
-def number(x: float) -> str:
-    """Return a number in six significant digits, as people write it."""
+def number(x: float, digits: int = 6) -> str:
+    """Return a number in so many significant digits, six at most, as people write it."""
     if math.isinf(x):
         return "inf" if x > 0 else "-inf"
+    x = float(f"{x:.{digits}g}") if digits < 6 else x
     text = f"{x:.6g}"
     return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
 
@@ -42,7 +43,7 @@ def percent(deviation: float) -> str:
         return "not comparable"
     if deviation < EXACT:
         return "none"
-    return f"{number(float(f'{100 * deviation:.2g}'))} %" if deviation < 10 else "over 1000 %"
+    return f"{number(100 * deviation, 2)} %" if deviation < 10 else "over 1000 %"
 
 
 def decibels(band: Band) -> str:
@@ -108,11 +109,11 @@ def emulation_line(c: Certificate) -> str:
     before = ", before rounding" if c.dials else ""
     if e.is_exact:
         return f"run against each other every {scans}{taken} without limits{before}: the same output, scan by scan"
-    still = "none" if e.is_exact_on_measurement else f"{number(float(f'{e.on_measurement:.2g}'))} %"
+    still = "none" if e.is_exact_on_measurement else f"{number(e.on_measurement, 2)} %"
     return (
         f"run against each other every {scans}{taken} without limits{before}: outputs differ by up to "
-        f"{number(float(f'{e.largest:.2g}'))} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
-        f"{number(float(f'{e.size:.3g}'))} %), while the setpoint rests: {still}"
+        f"{number(e.largest, 2)} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
+        f"{number(e.size, 3)} %), while the setpoint rests: {still}"
     )
 
 
@@ -151,7 +152,7 @@ def textbook_line(c: Conversion) -> str:
 
 
 def _four_digits(x: float) -> str:
-    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))
+    return "-" if math.isnan(x) else number(x, 4)
 
 
 def loop_rows(loop: LoopComparison) -> list[list[str]]:

@@ -153,11 +153,11 @@ def _phase_lost(target: Settings, dial: Value) -> str:
     w = abs(2 * m0 / m1)
     before, after = (complex(s.law().response(w)) for s in (target, target.changed({dial.name: dial.value})))
     lost = math.degrees(cmath.phase(before / after))
-    return f" ({_digits(lost)} degrees of phase less at {number(float(f'{w:.3g}'))} rad/s)" if lost >= 0.5 else ""
+    return f" ({_digits(lost)} degrees of phase less at {number(w, 3)} rad/s)" if lost >= 0.5 else ""
 
 
 def _digits(x: float) -> str:
-    return "infinite" if math.isinf(x) else number(float(f"{x:.3g}"))
+    return "infinite" if math.isinf(x) else number(x, 3)
 
 
 def _filter_time(settings: Settings, h: float | None) -> float:

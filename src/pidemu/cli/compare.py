@@ -174,7 +174,7 @@ def _title(c: Comparison, file: str | None) -> str:
 def _percent(x: float) -> str:
     if math.isnan(x):
         return "-"
-    return "none" if x < NO_BUMP else number(float(f"{x:.3g}"))
+    return "none" if x < NO_BUMP else number(x, 3)
 
 
 def _table(columns: list[str], rows: list[list[str]]) -> None:

@@ -192,4 +192,4 @@ def _badness(row: Mapping[str, Any]) -> float:
 
 
 def _figure(x: float) -> str:
-    return "-" if math.isnan(x) else number(float(f"{x:.3g}")) if abs(x) < 1 else number(float(f"{x:.4g}"))
+    return "-" if math.isnan(x) else number(x, 3) if abs(x) < 1 else number(x, 4)

@@ -73,5 +73,5 @@ def _how_far(far: Apart) -> str:
         return "Not all of them have integral action."
     if far.integral > 1 + 1e-9:
         return f"Their integral gains are apart by a factor of up to {far.integral:.3g}."
-    deviation = f"up to {number(float(f'{100 * far.deviation:.2g}'))} %" if far.deviation < 10 else "over 1000 %"
+    deviation = f"up to {number(100 * far.deviation, 2)} %" if far.deviation < 10 else "over 1000 %"
     return f"Their integral gains are the same; their laws for measurement differ by {deviation} in the loop band."

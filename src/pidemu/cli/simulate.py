@@ -190,4 +190,4 @@ def _step(step: Step | None) -> str:
 
 
 def _short(x: float) -> str:
-    return "-" if math.isnan(x) else number(float(f"{x:.4g}"))
+    return "-" if math.isnan(x) else number(x, 4)

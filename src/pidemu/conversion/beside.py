@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pidemu.certificate.figures import number, percent
 from pidemu.certificate.models import EXACT, LEAST_PHASE, RANK
 from pidemu.conversion.aim import Aim
+from pidemu.conversion.command import set_words
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.options import Attempt
+from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
 from pidemu.settings import Settings
 from pidemu.units import Role
@@ -87,13 +89,13 @@ def _runner_up_text(best: Attempt, other: Attempt) -> str:
     options = ", ".join(
         f"{n}={x}" for n, x in other.settings.options.items() if best.settings and best.settings.options.get(n) != x
     )
-    return f"{options}: {verdict}, {_dials(other.settings)}"
+    return f"{options}: {verdict}, {dials_text(other.settings)}"
 
 
 def _set(best: Attempt, other: Attempt) -> str:
     assert other.settings is not None
     chosen = {n: x for n, x in other.settings.options.items() if n in other.changed or n in best.changed}
-    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in chosen.items())
+    return set_words(chosen)
 
 
 def _is_another(a: Settings, b: Settings) -> bool:
@@ -103,8 +105,9 @@ def _is_another(a: Settings, b: Settings) -> bool:
     return dials[0] != dials[1] or (x.kp and x.b) != (y.kp and y.b) or (x.kd and x.c) != (y.kd and y.c)
 
 
-def _dials(s: Settings) -> str:
-    return ", ".join(f"{n} {number(float(f'{v.value:.{_DIGITS}g}'))}" for n, v in s.items() if v.active and v.given)
+def dials_text(s: Settings) -> str:
+    """Return the dials that were set, in four digits and one line."""
+    return ", ".join(f"{n} {number(v.value, _DIGITS)}" for n, v in s.items() if v.active and v.given)
 
 
 def stands_beside(c: Conversion) -> Iterator[Beside]:
@@ -127,7 +130,8 @@ def _own_numbers(c: Conversion) -> Iterator[Beside]:
         own, _ = work.settings(Aim("same-numbers"))
         off = work.continuous_deviation(own)
         if _is_another(c.unrounded, own) and EXACT < off < _NEAR:
-            yield Beside("same-numbers", f"the source's own numbers: {_dials(own)}, {percent(off)}", own, "--match same-numbers")
+            text = f"the source's own numbers: {dials_text(own)}, {percent(off)}"
+            yield Beside("same-numbers", text, own, "--match same-numbers")
 
 
 def _matched(c: Conversion) -> Iterator[Beside]:
@@ -139,22 +143,21 @@ def _matched(c: Conversion) -> Iterator[Beside]:
         found, _ = work.settings(Aim("low-frequency"))
         if _is_another(c.unrounded, found):
             off = percent(work.continuous_deviation(found))
-            yield Beside("matched", f"matched at low frequencies: {_dials(found)}, {off}", found, "--match low-frequency")
+            yield Beside("matched", f"matched at low frequencies: {dials_text(found)}, {off}", found, "--match low-frequency")
 
 
 def _absorbed(c: Conversion) -> Iterator[Beside]:
     """Yield settings that take a filter of the measurement into the dials, beside those that need a lag in front of the block."""
     if not c.settings.lag:
         return
-    from pidemu.conversion.convert import converted
+    from pidemu.conversion.convert import again
 
     with suppress(PidemuError):
-        request = replace(c.request, options=dict(c.settings.options), match="low-frequency", assume=True)
-        found = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
+        found = again(c, options=dict(c.settings.options), match="low-frequency")
         off = found.certificate.feedback.loop_band.max_deviation
         turned = any(v.value < 0 for v in found.settings.values() if v.role is Role.DERIVATIVE)
         if off < _FAR and not turned:
-            text = f"without the lag, absorbed into the dials: {_dials(found.settings)}, {percent(off)}"
+            text = f"without the lag, absorbed into the dials: {dials_text(found.settings)}, {percent(off)}"
             yield Beside("absorbed", text, found.settings, "--match low-frequency")
 
 
@@ -163,33 +166,31 @@ def _compensated(c: Conversion) -> Iterator[Beside]:
     cost, work = c.certificate.scan_cost, c.ranking[0].solver
     if cost is None or work is None or c.request.compensate or cost.too_slow or abs(cost.phase_deg) < LEAST_PHASE:
         return
-    from pidemu.conversion.convert import converted
+    from pidemu.conversion.convert import again
 
     with suppress(PidemuError):
-        request = replace(c.request, options=dict(c.settings.options), compensate=True, assume=True)
-        bent = converted(replace(c.source, pace=1.0), c.settings.card, request, emulate=False)
+        bent = again(c, options=dict(c.settings.options), compensate=True)
         if _is_another(c.settings, bent.settings):
             before, after = (x.feedback_at_scan for x in (c.certificate, bent.certificate))
             assert before is not None
             assert after is not None
             off = [percent(x.loop_band.max_deviation) for x in (before, after)]
-            text = f"compensated for the scans: {_dials(bent.settings)}; at the scans {off[1]} off instead of {off[0]}"
+            text = f"compensated for the scans: {dials_text(bent.settings)}; at the scans {off[1]} off instead of {off[0]}"
             yield Beside("compensated", text, bent.settings, "--compensate")
 
 
 def _unstated(c: Conversion) -> Iterator[Beside]:
     """Yield what other readings of the source would give, where they were not worth a question."""
-    from pidemu.conversion.convert import converted
+    from pidemu.conversion.convert import again
 
     for o in c.opens:
         for other in o.others:
-            request = replace(c.request, assume=True, digits=c.request.digits or _DIGITS + 1)
             with suppress(PidemuError):
-                found = converted(replace(other.settings, pace=1.0), c.settings.card, request, emulate=False)
+                found = again(c, other.settings, digits=c.request.digits or DIGITS)
                 same = not _is_another(c.settings, found.settings)
                 if not same or found.verdict != c.verdict:
                     options = "".join(f", {n}={x}" for n, x in found.settings.options.items() if c.settings.options.get(n) != x)
                     stated = f"{o.about} is not stated and {o.taken.value} is taken"
-                    dials = f"the same dials, {found.verdict}" if same else f"{_dials(found.settings)}{options}"
+                    dials = f"the same dials, {found.verdict}" if same else f"{dials_text(found.settings)}{options}"
                     text = f"{stated}; with {other.value}: {dials}"
                     yield Beside("unstated", text, found.settings, f"{o.about}={other.value}")

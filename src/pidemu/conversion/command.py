@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
@@ -12,6 +12,11 @@ from pidemu.errors import PidemuError
 from pidemu.plain import exactly
 from pidemu.ranges import RANGES, option_of
 from pidemu.settings import Settings
+
+
+def set_words(options: Mapping[str, str]) -> str:
+    """Return the words that state options of the target, as one types them: ``--set FORM=Series``."""
+    return " ".join(f'--set "{n}={x}"' if " " in x else f"--set {n}={x}" for n, x in options.items())
 
 
 def words_for(source: Settings, target: Card, request: Request) -> str:

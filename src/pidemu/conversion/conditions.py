@@ -11,6 +11,7 @@ from pidemu.card.load import Statement
 from pidemu.card.models import Equation
 from pidemu.card.terms import Filter
 from pidemu.certificate.figures import number, percent
+from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
 from pidemu.settings import Settings
 from pidemu.units import Role
@@ -175,7 +176,7 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
 def _bump_test(s: Settings, other: Form) -> str:
     """Return the test on the old controller that tells two forms apart: what a PV step leaves beside the integral."""
     varied = replace(s, variant=replace(s.variant, equation=s.equation.model_copy(update={"form": other})))
-    jumps = [_short(abs(x.law().moments()[1])) for x in (s, varied)]
+    jumps = [number(abs(x.law().moments()[1]), 4) for x in (s, varied)]
     return (
         f"a bump test tells: once the derivative has died out, a PV step of 1 % has moved the old output by {jumps[0]} % "
         f"({s.equation.form.value}) or {jumps[1]} % ({other.value}), besides the ramp"
@@ -193,10 +194,6 @@ def _with_filter(e: Equation, ratio: float) -> Equation:
     return e.model_copy(update={"derivative": e.derivative.model_copy(update={"filter": new})})
 
 
-def _short(x: float) -> str:
-    return number(float(f"{x:.4g}"))
-
-
 def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], Equation], *, is_source: bool) -> str:
     """Return the dials that another fact of the source leads to, or how far off the dials are with another one of the target."""
     varied = replace(s, variant=replace(s.variant, equation=change(s.equation)))
@@ -206,17 +203,16 @@ def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], 
             if work is None:
                 return ""
             return f"{when} the two differ by {percent(work.continuous_deviation(varied))} in the loop band"
-        from pidemu.conversion.convert import converted
+        from pidemu.conversion.convert import again
 
-        options = dict(c.settings.options)
-        request = replace(
-            c.request, options=options, assume=True, allow_approximate=True, digits=c.request.digits or 5, process=None
-        )
-        other = converted(varied, c.settings.card, request, emulate=False)
+        options, digits = dict(c.settings.options), c.request.digits or DIGITS
+        other = again(c, varied, options=options, allow_approximate=True, digits=digits, process=None)
     except PidemuError:
         return ""
     dials = [
-        f"{n} {_short(v.value)}" for n, v in other.settings.items() if v.active and _short(v.value) != _short(c.settings[n].value)
+        f"{n} {number(v.value, 4)}"
+        for n, v in other.settings.items()
+        if v.active and number(v.value, 4) != number(c.settings[n].value, 4)
     ]
     if dials:
         return f"{when}: {', '.join(dials)}"

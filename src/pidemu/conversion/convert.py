@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pidemu.action import switch_position
 from pidemu.card.library import load_card
@@ -22,6 +22,7 @@ from pidemu.conversion.asking import (
     scale_questions,
     taken_for_granted,
 )
+from pidemu.conversion.command import set_words
 from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.modes import MODES, Mode
@@ -206,6 +207,22 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     return conversion
 
 
+def again(c: Conversion, source: Settings | None = None, **changes: Any) -> Conversion:
+    """Return a conversion with something else asked for, of its source or of another reading of that; its linear figures alone.
+
+    Parameters
+    ----------
+    c : Conversion
+        The conversion.
+    source : Settings, optional
+        What is converted in place of its source.
+    **changes
+        What of its `Request` is another.
+    """
+    read = replace(c.source if source is None else source, pace=1.0)
+    return converted(read, c.settings.card, replace(c.request, **{"assume": True, **changes}), emulate=False)
+
+
 def _concluded(
     best: Attempt,
     settings: Settings,
@@ -297,8 +314,7 @@ class _Work:
             for n in chosen
             if n in attempt.changed or (n in self.taken and str(self.taken[n]).casefold() != chosen[n].casefold())
         }
-        text = " ".join(f'--set "{n}={c}"' if " " in c else f"--set {n}={c}" for n, c in words.items())
-        return f"; other options would do: {text}: {attempt.verdict}"
+        return f"; other options would do: {set_words(words)}: {attempt.verdict}"
 
 
 def _paced(source: Settings, request: Request) -> Settings:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from pidemu.certificate.figures import number, percent
+from pidemu.certificate.figures import percent
+from pidemu.conversion.beside import dials_text
 
 if TYPE_CHECKING:
     from pidemu.conversion.options import Attempt
@@ -57,6 +58,5 @@ def _explained(a: Attempt, best: Attempt) -> Explained:
     options = ", ".join(f"{n}={x}" for n, x in a.settings.options.items()) or "none"
     paths = (a.certificate.headline, a.certificate.setpoint_headline)
     off = [percent(p.loop_band.max_deviation) for p in paths]
-    dials = ", ".join(f"{n} {number(float(f'{v.value:.4g}'))}" for n, v in a.settings.items() if v.active and v.given)
     why = "taken" if a is best else (best.merit and a.merit.worse_by(best.merit)) or "as good, but it comes later in the card"
-    return Explained(options, a.verdict, off[0], off[1], dials, why)
+    return Explained(options, a.verdict, off[0], off[1], dials_text(a.settings), why)

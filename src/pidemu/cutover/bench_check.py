@@ -188,7 +188,7 @@ def _response(settings: Settings, move: _Move) -> str:
         rest = f"a {noun} of {_amount(settings, 'op', move.jump)} is left" if move.jump else "it is back"
         text = (
             f"{_verb(move.kick)} by {_amount(settings, 'op', move.kick)} at first; when the derivative has died out, after "
-            f"{number(float(f'{move.settles:.2g}'))} s, {rest}"
+            f"{number(move.settles, 2)} s, {rest}"
         )
     if not move.ramp:
         return text or "does not move"
@@ -205,15 +205,11 @@ def _verb(x: float, ending: str = "s") -> str:
 def _amount(settings: Settings, signal: str, x: float) -> str:
     """Return a size in percent of span, and in the signal's own units where its range is given."""
     given = settings.pv_range if signal == "pv" else settings.op_range
-    size = _digits(abs(x))
+    size = number(abs(x), 4)
     if given is None:
         return f"{size} {'%' if settings.equation.signals == 'percent' else f'{signal.upper()} units'}"
     own = abs(x) * given.span / 100
     if given.ends == (0.0, 100.0) and given.unit in ("", "%"):
         return f"{size} %"
     unit = given.unit or f"{signal.upper()} units"
-    return f"{size} % ({_digits(own)} {unit})"
-
-
-def _digits(x: float) -> str:
-    return number(float(f"{x:.4g}"))
+    return f"{size} % ({number(own, 4)} {unit})"

@@ -65,4 +65,4 @@ def _check(name: str, x: float, given: SignalRange | None) -> None:
 
 def _text(x: float, given: SignalRange | None) -> str:
     unit = "%" if given is None else given.unit
-    return f"{number(float(f'{x:.7g}'))} {unit}".rstrip()
+    return f"{number(x)} {unit}".rstrip()

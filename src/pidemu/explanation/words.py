@@ -23,7 +23,7 @@ _LASTS: Final = 4.0
 
 def four(x: float) -> str:
     """Return a number in four significant digits."""
-    return number(float(f"{x:.4g}") + 0.0) if math.isfinite(x) else number(x)
+    return number(x + 0.0, 4)
 
 
 def summary_of(e: Explanation, a: Algorithm) -> Iterator[str]:

@@ -113,7 +113,7 @@ def responses_picture(r: Responses, names: Mapping[Who, str]) -> str:
         pairs = (("setpoint", r.setpoint), ("measurement", r.measurement))
         for axis, (moves, traces) in zip(axes[0], pairs, strict=True):
             _draw(axis, traces, names)
-            axis.set_title(f"output [%] after a {moves} step of {number(float(f'{r.size:.3g}'))} %")
+            axis.set_title(f"output [%] after a {moves} step of {number(r.size, 3)} %")
             axis.set_xlabel("time [s]")
         return _svg(figure, "responses", axes[0, 0])
 
@@ -203,7 +203,7 @@ def _draw(axis: Axes, traces: Sequence[Trace], names: Mapping[Who, str]) -> None
     axis.set_ylim(shown[0] - margin, shown[1] + margin)
     for end, cut, where in ((bottom, bottom < shown[0] - margin, 0), (top, top > shown[1] + margin, 1)):
         if cut:
-            words = "grows without end" if not math.isfinite(end) or abs(end) > 1e6 else f"reaches {number(float(f'{end:.3g}'))} %"
+            words = "grows without end" if not math.isfinite(end) or abs(end) > 1e6 else f"reaches {number(end, 3)} %"
             axis.annotate(
                 words,
                 (0.99, 0.97 if where else 0.03),
