@@ -124,7 +124,8 @@ def relation(source: SignalRange | None, target: SignalRange | None, which: Whic
         return _corresponds(which, old, new)
     if "none" in (a.kind, b.kind) and old.ends == new.ends:
         return Relation()  # a unit that one of them leaves out
-    return _unless_alike(_which_of_two(which, (source, target), (old, new)))
+    found = _unless_alike(_which_of_two(which, (source, target), (old, new)))
+    return _corresponds(which, old, new) if isinstance(found, Relation) and "none" not in (a.kind, b.kind) else found
 
 
 def in_target_units(x: float, source: SignalRange | None, target: SignalRange | None) -> float:

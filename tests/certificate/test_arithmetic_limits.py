@@ -54,8 +54,8 @@ def test_the_slow_integral_of_the_specification_stands_still_in_float32() -> Non
     assert found.figures[SMALLEST][1] == pytest.approx(half / 0.05, rel=1e-4)  # 0.156 %, of which the setpoint shows 4e-6
     assert found.figures[SMALLEST][0] < 1e-8
     assert found.text == (
-        "With the output at 50 % the integral does not move for errors smaller than 0.0001 % of span on generic/standard, 0.16 % "
-        "of span on iec/61131-3-pid: generic/standard computes in 64 bits and iec/61131-3-pid computes in 32 bits."
+        "With the output at 50 % the smallest error that the integral follows is below 0.0001 % of span on generic/standard, 0.16 "
+        "% of span on iec/61131-3-pid: generic/standard computes in 64 bits and iec/61131-3-pid computes in 32 bits."
     )
 
 

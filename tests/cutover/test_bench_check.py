@@ -92,8 +92,8 @@ def test_the_kick_of_the_derivative_stands_apart_and_the_step_is_small_enough_fo
     assert check.kick == pytest.approx(first, rel=1e-9)
     assert check.jump == pytest.approx(2.5 * (1 + 4.32 / 30), rel=1e-6)
     assert check.text.endswith(
-        "move PV up by 1 %: the output rises by 18.51 % at first; when the derivative has died out, after 2.8 s, a rise of 2.86 % "
-        "is left, and it goes on rising at 5 % per minute."
+        "move PV up by 1 %: the output rises by 18.51 % at first, at a scan every 0.2 s; when the derivative has died out, after "
+        "2.8 s, a rise of 2.86 % is left, and with it a rise of 5 % per minute since the step."
     )
 
 

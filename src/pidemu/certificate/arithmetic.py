@@ -101,7 +101,7 @@ def arithmetic_differences(source: Side, target: Side) -> Iterator[NonlinearDiff
         return
     if max(least) >= _MEASURED and not math.isclose(*least, rel_tol=_DIFFERS):
         words = ", ".join(f"{_least(e)} on {side.name}" for e, side in zip(least, both, strict=True))
-        text = f"With the output at 50 % the integral does not move for errors smaller than {words}: {kinds}."
+        text = f"With the output at 50 % the smallest error that the integral follows is {words}: {kinds}."
         yield NonlinearDifference("arithmetic", text, {"smallest error that integrates [% of PV span]": least})
 
 
@@ -110,5 +110,5 @@ _KINDS: Final = {"float64": "64 bits", "float32": "32 bits", "integer": "whole n
 
 def _least(error: float) -> str:
     if math.isinf(error):
-        return "50 % of span"
-    return "0.0001 % of span" if error < _NEGLIGIBLE else f"{error:.2g} % of span"
+        return "above 50 % of span"
+    return "below 0.0001 % of span" if error < _NEGLIGIBLE else f"{error:.2g} % of span"

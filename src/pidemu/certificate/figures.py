@@ -26,11 +26,11 @@ _LOOP_ROWS: Final = (
 
 
 def number(x: float, digits: int = 6) -> str:
-    """Return a number in so many significant digits, six at most, as people write it."""
+    """Return a number in so many significant digits, as people write it."""
     if math.isinf(x):
         return "inf" if x > 0 else "-inf"
     x = float(f"{x:.{digits}g}") if digits < 6 else x
-    text = f"{x:.6g}"
+    text = f"{x:.{max(digits, 6)}g}"
     return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
 
 
@@ -109,11 +109,12 @@ def emulation_line(c: Certificate) -> str:
     before = ", before rounding" if c.dials else ""
     if e.is_exact:
         return f"run against each other every {scans}{taken} without limits{before}: the same output, scan by scan"
+    rules = "; they compute by different scan rules" if e.scan[0] == e.scan[1] and not e.same_rules else ""
     still = "none" if e.is_exact_on_measurement else f"{number(e.on_measurement, 2)} %"
     return (
         f"run against each other every {scans}{taken} without limits{before}: outputs differ by up to "
         f"{number(e.largest, 2)} % of span ({e.segment}, at {number(e.largest_at)} s; the source moves by "
-        f"{number(e.size, 3)} %), while the setpoint rests: {still}"
+        f"{number(e.size, 3)} %), while the setpoint rests: {still}{rules}"
     )
 
 
@@ -131,9 +132,10 @@ def rounding_line(c: Certificate, digits: int | None) -> str:
     if before is None:
         return ""
     how = ", ".join(d.name for d in c.dials if d.to_resolution)
-    words = f"rounded to {digits} digits" + (f", {how} to the dial's resolution" if how else "")
+    words = f"rounded to {digits} digit{'' if digits == 1 else 's'}" + (f", {how} to the dial's resolution" if how else "")
     if before.is_exact:
-        return f"{words}: within {percent(c.headline.loop_band.max_deviation)}"
+        off = c.headline.loop_band.max_deviation
+        return f"{words}: {'without effect' if off < EXACT else f'within {percent(off)}'}"
     old, new = (percent(p.loop_band.max_deviation) for p in (before, c.headline))
     return f"{words}: {new} in the loop band, {'as before' if old == new else f'instead of {old}'}"
 

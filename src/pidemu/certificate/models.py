@@ -366,9 +366,13 @@ class Certificate:
         moved = self.is_bent or contradicted or slow or coarse or self.shifts_for_good
         if moved or not self.feedback_is_exact:
             return "approximate"
-        limited = any(d.aspect == "setpoint" and d.figures for d in self.nonlinear)  # without figures it is about manual
-        same = self.setpoint_is_exact_in(mode) and not limited
+        same = self.setpoint_is_exact_in(mode) and not self.setpoint_is_limited
         return "exact" if same else "exact-feedback"
+
+    @property
+    def setpoint_is_limited(self) -> bool:
+        """Whether one of the two limits the rate of the setpoint otherwise than the other one."""
+        return any(d.aspect == "setpoint" and d.figures for d in self.nonlinear)  # without figures it is about manual
 
     @property
     def feedback_is_exact(self) -> bool:

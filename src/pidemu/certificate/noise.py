@@ -3,7 +3,7 @@
 The noise gain is the largest move of the output that one measurement which is off by 1 % makes, at the scan interval: of a
 derivative with a first-order filter ``kp + kd/(Tf + h)`` with the backward rule, and the integral's share of that scan (the impulse
 response of specs/equations.md, section 4). Without a scan interval it is the gain at high frequencies, infinite for a derivative
-without filter.
+without filter; what is above the corner of a filter that lets nothing through at infinite frequency.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from pidemu.certificate.figures import number, unit_of
 from pidemu.errors import PidemuError
+from pidemu.law import Law
 from pidemu.settings import Settings, Value, limits
 from pidemu.units import Role
 
@@ -70,7 +71,8 @@ def noise_gain(settings: Settings, scan: float | None = None) -> float:
     settings : Settings
         The controller.
     scan : float, optional
-        Scan interval [s]; without it the gain at high frequencies of the continuous law.
+        Scan interval [s]; without it the gain of the continuous law at high frequencies: at infinite frequency or, where a filter
+        lets nothing through there, the largest above the corner of the fastest filter.
 
     Examples
     --------
@@ -79,10 +81,25 @@ def noise_gain(settings: Settings, scan: float | None = None) -> float:
     >>> round(noise_gain(s, 0.2), 1)
     18.5
     """
-    law = settings.law(scan)
-    if scan is not None:
+    return noise_gain_of(settings.law(scan))
+
+
+def noise_gain_of(law: Law) -> float:
+    """Return the noise gain of a law; see `noise_gain`."""
+    if law.scan is not None:
         return float(np.max(np.abs(law.impulse(_SAMPLES))))
-    return abs(law.kick("feedback"))
+    return abs(law.kick("feedback")) or _beyond_the_corner(law)
+
+
+def _beyond_the_corner(law: Law) -> float:
+    """Return the largest gain above the corner of the fastest filter; 0 where there is none."""
+    a = law.algorithm
+    times = [
+        a.Tf if a.has_signal_filter or a.has_term_filter else 0.0,
+        *(f.time for f in (a.pv_filter, a.e_filter) if f is not None),
+    ]
+    fastest = min((t for t in times if t), default=0.0)
+    return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0
 
 
 def noise_change(source: Settings, target: Settings, scans: tuple[float, float] | None = None, factor: float = 1.0) -> NoiseChange:

@@ -31,7 +31,13 @@ _ROUNDED_BUMP: Final = 1e-4
 
 
 def nonlinear_differences(
-    source: Settings, target: Settings, scans: tuple[float, float], time_and_size: tuple[float, float]
+    source: Settings,
+    target: Settings,
+    scans: tuple[float, float],
+    time_and_size: tuple[float, float],
+    *,
+    limits: tuple[float, float] | None = None,
+    in_cascade: bool = False,
 ) -> tuple[NonlinearDifference, ...]:
     """Return what two controllers do differently beyond the linear law (specs/equations.md, sections 5 to 9).
 
@@ -49,6 +55,10 @@ def nonlinear_differences(
     time_and_size : tuple of float
         Characteristic time [s] and size [%] of the standard record, as `pidemu.record.standard.scale_of` gives them for the source.
         A time of more than 2,000 scans of the faster, or less than 20 of the slower controller gives way to that.
+    limits : tuple of float, optional
+        Output limits that both are set to [% of the output span]; by default the source card's.
+    in_cascade : bool
+        Whether only a remote setpoint counts.
 
     Returns
     -------
@@ -66,15 +76,15 @@ def nonlinear_differences(
     (0.0, -4.04)
     """
     both = sides(source, target, scans)
-    trial = planned(both, time_and_size, limits_for(source, None, (0.0, 100.0)))
+    trial = planned(both, time_and_size, limits_for(source, None, (0.0, 100.0)) if limits is None else limits)
     found = [
         *_emulated(both, trial),
         *_bias(*both),
-        *limit_differences(*both),
+        *limit_differences(*both, stated=limits is not None),
         *arithmetic_differences(*both),
         *error_differences(*both),
         *output_differences(*both),
-        *setpoint_differences(*both),
+        *setpoint_differences(*both, in_cascade=in_cascade),
     ]
     return tuple(found)
 

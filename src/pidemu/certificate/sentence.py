@@ -53,7 +53,9 @@ def _of_the_controllers(c: Certificate, conditions: Sequence[str]) -> str:
             f"{_setpoint(c)}."
         )
     if c.feedback_is_exact:
-        other = "" if c.setpoint_is_exact_in("auto") else f" Setpoint changes differ too: {_kick(c.setpoint_kick)}."
+        same = c.setpoint_is_exact_in("auto")
+        other = f" Setpoint changes differ too: {_LIMITED if same else _kick(c.setpoint_kick)}."
+        other = "" if same and not c.setpoint_is_limited else other
         return f"The two equations are the same{_if(conditions)}; {_what_differs(c)}.{other}"
     return f"Where the crossover of the loop {_lies(c)}, {_differ(c)}{_if(conditions)}.{_also(c)}"
 
@@ -100,6 +102,7 @@ def _also(c: Certificate) -> str:
     return f" Setpoint changes: {_kick(c.setpoint_kick)}."
 
 
+_LIMITED: Final = "the two do not limit the rate of the setpoint alike"
 _WORSE: Final = 0.1
 """Deviation of the setpoint path from which it is worth a word beside the other path's."""
 
@@ -107,6 +110,8 @@ _WORSE: Final = 0.1
 def _setpoint(c: Certificate) -> str:
     """Return how setpoint changes differ, by mode where that matters."""
     cascade = c.kick_in_cascade
+    if c.setpoint_is_limited and all(c.setpoint_is_exact_in(mode) for mode in ("auto", "cascade")):
+        return f"setpoint changes differ: {_LIMITED}"
     if c.setpoint_in_cascade is None or cascade is None:
         return f"setpoint changes differ: {_kick(c.setpoint_kick)}"
     if c.setpoint_is_exact_in("auto"):

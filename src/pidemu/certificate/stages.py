@@ -13,15 +13,15 @@ Figures = dict[str, tuple[float, float]]
 Pair = tuple[float, float]
 
 
-def limit_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
-    """Yield how default output limits and the limits of the integral itself differ (specs/equations.md, section 5)."""
+def limit_differences(source: Side, target: Side, *, stated: bool = False) -> Iterator[NonlinearDifference]:
+    """Yield how output limits as delivered, unless others are `stated`, and limits of the integral itself differ (section 5)."""
     both = (source, target)
     figures: Figures = {}
     parts = []
     unknown = any(side.engineering and side.settings.op_range is None for side in both)
     low, high = zip(*(side.limits if unknown else side.limits_percent for side in both), strict=True)
     units = [side.unit if unknown else "%" for side in both]
-    if not (alike(*low) and alike(*high)):
+    if not (stated or (alike(*low) and alike(*high))):
         unit = units[0] if units[0] == units[1] else "% or engineering units"
         figures |= {f"low output limit [{unit}]": _pair(low), f"high output limit [{unit}]": _pair(high)}
         words = ", ".join(f"{_span((low[i], high[i]), units[i])} on {both[i].name}" for i in (0, 1))
@@ -144,8 +144,11 @@ def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifferen
     )
 
 
-def setpoint_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
-    """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual."""
+def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False) -> Iterator[NonlinearDifference]:
+    """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual.
+
+    With `in_cascade` the remote setpoint alone counts, which some do not limit.
+    """
     words = [
         f"On {side.name} the setpoint follows PV in manual and stays there until it is changed"
         for side, other in ((source, target), (target, source))
@@ -156,10 +159,12 @@ def setpoint_differences(source: Side, target: Side) -> Iterator[NonlinearDiffer
         for side, other in ((source, target), (target, source))
         if _from_zero(side) and not _from_zero(other)
     ]
-    rates = {
-        "setpoint rate limit [%/s]": _of(source, target, lambda side: side.own.sp_rate * side.pv_percent),
-        "setpoint rate limit downwards [%/s]": _of(source, target, lambda side: side.own.sp_rate_down * side.pv_percent),
-    }
+    free = [in_cascade and side.own.sp_rate_local for side in (source, target)]
+    up, down = (
+        tuple(math.inf if none else rate * side.pv_percent for none, rate, side in zip(free, rates, (source, target), strict=True))
+        for rates in ([s.own.sp_rate for s in (source, target)], [s.own.sp_rate_down for s in (source, target)])
+    )
+    rates = {"setpoint rate limit [%/s]": (up[0], up[1]), "setpoint rate limit downwards [%/s]": (down[0], down[1])}
     if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(s.own.sp_rate == s.own.sp_rate_down for s in (source, target)):
         del rates["setpoint rate limit downwards [%/s]"]
     yield from _numbers("setpoint", (source, target), rates, words)

@@ -127,7 +127,7 @@ def story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
         )
         then = ", until the loop removes the difference" if both[1].integrates else ""
         parts.append(
-            f"{start} {3 * plan.time:.4g} s of error the other way and back at zero, the output is "
+            f"{start} {3 * plan.time:.4g} s of an error of {plan.error:.3g} % the other way and back at zero, the output is "
             f"{_on_each((old.at_zero, new.at_zero))}{then}."
         )
     if found.noisy is not None and (not parts or _apart(found.noisy) > _MORE * _apart((old.at_zero, new.at_zero))):

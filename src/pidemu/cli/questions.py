@@ -22,7 +22,7 @@ def print_questions(error: QuestionError, source: Settings | None, goal: str, as
         return
     for question in error.questions:
         _print(question)
-    if source is not None and all(q.readings for q in error.questions):
+    if source is not None and all(q.readings and q.kind != "action" for q in error.questions):
         click.echo("\n--assume takes the first reading of each question, and says so.", err=True)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pidemu.card.base import Form, Status
 from pidemu.card.load import Statement
 from pidemu.card.models import Equation
+from pidemu.card.references import is_active
 from pidemu.card.terms import Filter
 from pidemu.certificate.figures import number, percent
 from pidemu.conversion.request import DIGITS
@@ -67,13 +68,18 @@ class Condition:
 
 def conditions_of(c: Conversion) -> tuple[Condition, ...]:
     """Return the conditions of a conversion's verdict, what is assumed before what is inferred."""
-    found = [*_of(c, c.source, is_source=True), *_of(c, c.settings, is_source=False)]
+    if c.source.card.id == c.settings.card.id and c.source.options == c.settings.options:
+        return ()  # whatever the facts are, they are those of both
+    names = [_name(c.source), _name(c.settings)]
+    if names[0] == names[1] and c.source.card.id != c.settings.card.id:
+        names = [c.source.card.id, c.settings.card.id]
+    found = [*_of(c, c.source, names[0], is_source=True), *_of(c, c.settings, names[1], is_source=False)]
     seen = {x.text: x for x in reversed(found)}
     ordered = [x for x in found if seen[x.text] is x]
     return tuple(sorted(ordered, key=lambda x: (not x.headline, x.status != Status.ASSUMED)))
 
 
-def _of(c: Conversion, s: Settings, *, is_source: bool) -> Iterator[Condition]:
+def _of(c: Conversion, s: Settings, name: str, *, is_source: bool) -> Iterator[Condition]:
     if s.card.data.kind == "equation":
         return
     a = s.algorithm()
@@ -84,7 +90,7 @@ def _of(c: Conversion, s: Settings, *, is_source: bool) -> Iterator[Condition]:
             continue
         if statement.path.startswith("derivative") and not a.kd:
             continue
-        words = _in_words(statement, s, _name(s))
+        words = _in_words(statement, s, name)
         rank = _MATTER.index(statement.path)
         if words is not None and (statement.key not in found or rank < found[statement.key][0]):
             found[statement.key] = rank, statement, words
@@ -123,9 +129,9 @@ def _in_words(statement: Statement, s: Settings, name: str) -> str | None:
         case "form":
             return f"{name} is of {e.form.value} form" if a.kd else None
         case "derivative.filter.ratio" if filt is not None and isinstance(filt.ratio, float | int):
-            return f"{name}'s derivative filter is {rate}/{number(1 / filt.ratio)}"
+            return f"{name}'s derivative filter is {_base(e, filt, rate)}/{number(1 / filt.ratio)}"
         case "derivative.filter.gain" if filt is not None and isinstance(filt.gain, float | int):
-            return f"{name}'s derivative filter is {rate}/{number(filt.gain)}"
+            return f"{name}'s derivative filter is {_base(e, filt, rate)}/{number(filt.gain)}"
         case "derivative.filter.time" if filt is not None and isinstance(filt.time, float | int):
             return f"{name}'s derivative filter is {number(filt.time)} s"
         case "derivative.filter.applies-to" if filt is not None:
@@ -139,6 +145,12 @@ def _in_words(statement: Statement, s: Settings, name: str) -> str | None:
         case "cascade.proportional.on":
             return f"P of {name} acts on the {_ON[e.cascade.proportional.on]} in cascade" if e.cascade else None
     return None
+
+
+def _base(e: Equation, filt: Filter, rate: str) -> str:
+    """Return what a filter's ratio or gain refers to."""
+    gain = next((n for n, s in e.settings.items() if s.sets == Role.GAIN.value and is_active(e, n, s)), "the gain")
+    return f"({rate}/{gain})" if filt.of == "derivative-time" and e.form is Form.PARALLEL else rate
 
 
 _PLACES: Final = {

@@ -46,6 +46,7 @@ from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.ranges import RangeGiven
+from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
 from pidemu.settings import Settings, Value, limits
 from pidemu.units import Role, from_canonical, parse_unit
@@ -158,6 +159,8 @@ def convert(
     >>> conv.verdict, round(conv.settings["K"].value, 4), conv.settings["Ti"].value, conv.settings["Td"].value
     ('exact', 2.6667, 20.0, 3.75)
     """
+    if not isinstance(source, Settings):
+        raise SettingError(f"source is {source!r}; give settings, such as load_card('fisher/provox').settings(GAIN=2, RESET=4)")
     card = target if isinstance(target, Card) else load_card(target)
     request = read_request(
         card, options=options, given=given, scan=scan, runs_every=runs_every, mode=mode, action=action, match=match,
@@ -240,7 +243,8 @@ def _concluded(
     dials: tuple[Rounded, ...] = ()
     if request.digits is not None:
         settings, dials = rounded(settings, request.digits, request.given)
-    certificate = full_certificate(work, settings, unrounded if dials else settings, emulate=emulate)
+    stated = None if request.limits is None else Scale(source).limits_percent(request.limits)
+    certificate = full_certificate(work, settings, unrounded if dials else settings, limits=stated, emulate=emulate)
     if dials:
         certificate = replace(certificate, dials=dials)
     return Conversion(

@@ -14,7 +14,9 @@ from pidemu.record.standard import scale_of
 from pidemu.settings import Settings
 
 
-def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, emulate: bool) -> Certificate:
+def full_certificate(
+    work: Solver, settings: Settings, unrounded: Settings, *, limits: tuple[float, float] | None = None, emulate: bool
+) -> Certificate:
     """Return the certificate of a conversion's settings (specs/equations.md, section 9).
 
     Parameters
@@ -23,6 +25,8 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
         The conversion.
     settings, unrounded : Settings
         The target's settings as they are printed, and before rounding.
+    limits : tuple of float, optional
+        Output limits that the source is set to [% of the output span].
     emulate : bool
         Whether both controllers are emulated, for the points 3, 5 and 6.
     """
@@ -49,6 +53,7 @@ def full_certificate(work: Solver, settings: Settings, unrounded: Settings, *, e
         both = emulated(source, unrounded, scans, work.factor, taken=work.scans is None, in_cascade=work.first_mode == "cascade")
     except ScanError as error:
         return replace(certificate, not_emulated=str(error))
-    return replace(
-        certificate, scan_by_scan=both, nonlinear=nonlinear_differences(source, settings, scans, scale_of(source, scans[0]))
-    )
+    cascade = work.mode == "cascade"
+    size = scale_of(source, scans[0])
+    differences = nonlinear_differences(source, settings, scans, size, limits=limits, in_cascade=cascade)
+    return replace(certificate, scan_by_scan=both, nonlinear=differences)

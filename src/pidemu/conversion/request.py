@@ -141,6 +141,8 @@ class Request:
 
 _SHORTEST, _LONGEST = 1e-9, 1e9
 """Intervals beyond these are mistakes, and what is computed from them leaves the range of floating point [s]."""
+_OUTPUT = (-10.0, 110.0)
+"""Between these an output lies [% of span]: the usual limits leave 5 to 10 % beyond the range."""
 DIGITS = 5
 """Significant digits that the command line and the page print."""
 
@@ -205,7 +207,7 @@ def read_request(
         to_op_range=signal_range(card, "to_op_range", to_op_range),
         process=process,
         digits=checked_digits(digits),
-        bias=bias,
+        bias=_checked_bias(bias),
         limits=_checked_limits(limits),
         compensate=compensate,
         allow_approximate=allow_approximate,
@@ -230,6 +232,13 @@ def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float]
     target = declared[1] if len(declared) == 2 else real[0]
     target_real = real[1] if len(real) == 2 else target
     return (real[0], target_real), (_ratio(real[0], source), _ratio(target_real, target))
+
+
+def _checked_bias(bias: float | None) -> float | None:
+    low, high = _OUTPUT
+    if bias is not None and not low <= bias <= high:  # not a number compares false as well
+        raise SettingError(f"bias is {bias:g} %; it is the output at SP = PV, between {low:g} and {high:g} % of its span")
+    return bias
 
 
 def _checked_limits(limits: tuple[float, float] | None) -> tuple[float, float] | None:

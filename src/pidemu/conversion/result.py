@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from pidemu.action import ACTIONS, action_line, action_words, carried_action
 from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
@@ -161,9 +159,15 @@ class Conversion:
         from pidemu.cutover.bench_check import bench_check
 
         try:
-            return bench_check(self.settings, self.scan[1] if self.scan else None, self.action)
+            return bench_check(self.settings, self._checked_at, self.action)
         except ScanError as error:
             return error
+
+    @property
+    def _checked_at(self) -> float | None:
+        """The interval at which the check is worked out [s]: the target's, else the one at which the two were run."""
+        run = self.certificate.scan_by_scan
+        return self.scan[1] if self.scan else run.scan[1] if run is not None else None
 
     @property
     def at_the_loop(self) -> tuple[str, ...]:
@@ -181,8 +185,7 @@ class Conversion:
 
     def _limits(self, limits: tuple[float, float]) -> str:
         """Return what the source's output limits are on the target, in words."""
-        old, new = (Scale(s) for s in (self.source, self.settings))
-        low, high = (number(new.output_own(float(old.output_percent(np.array(x))))) for x in limits)
+        low, high = (number(Scale(self.settings).output_own(x)) for x in Scale(self.source).limits_percent(limits))
         unit = "%" if self.settings.equation.signals == "percent" else self.settings.own_ranges[1].unit or "output units"
         return f"set {low} to {high} {unit}"
 
@@ -242,12 +245,14 @@ class Conversion:
         SettingError
             One range is of a gauge pressure and the other one of an absolute pressure.
         """
-        from pidemu.cutover.old_signals import as_the_target_shows
+        from pidemu.cutover.old_signals import as_the_target_shows, in_signal_units
         from pidemu.cutover.plan import transfer_plan
 
         scan = self.scan[1] if self.scan else None
         signals, note = as_the_target_shows(self.source, self.settings, (sp, pv, op))
-        plan = transfer_plan(self.settings, *signals, scan=scan, action=action or self.action)
+        stated = self.request.limits and Scale(self.source).limits_percent(self.request.limits)
+        limits = stated and in_signal_units(stated, self.settings.op_range)
+        plan = transfer_plan(self.settings, *signals, scan=scan, action=action or self.action, output_limits=limits)
         return replace(plan, notes=(note, *plan.notes)) if note else plan
 
     @property

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 import pidemu
 from pidemu.conversion.document import SCHEMA
-from pidemu.conversion.schema import ActionPart, Asked, BenchCheckPart, ConditionPart, Day, Name, Sha256, Target
+from pidemu.conversion.schema import ConversionPart
 from pidemu.errors import CertificateError
 
 LARGEST: Final = 16 * 2**20
@@ -20,22 +20,12 @@ LARGEST: Final = 16 * 2**20
 _AGAIN: Final = "write the certificate again with 'pidemu convert ... --json'"
 
 
-class Signed(BaseModel):
-    """What a certificate is verified by; what else it holds follows from that, or is wording."""
+class Signed(ConversionPart):
+    """A whole certificate; keys that a later pidemu adds are left alone."""
 
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True, defer_build=True)
 
-    pidemu: Name
-    date: Day
-    cards: dict[Name, Sha256]
-    request: Asked
-    to: Target
-    verdict: Name
-    refusal: str
-    conditions: list[ConditionPart]
-    action: ActionPart
-    bench_check: BenchCheckPart | None
-    figures: dict[str, Any] = Field(alias="certificate")
+    certificate: dict[str, Any]
 
 
 def read_signed(source: str | Path | Mapping[str, Any]) -> tuple[str, Signed]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
 from pidemu.certificate.figures import emulation_line, kick_line, number, other_units, textbook_line, unit_of
@@ -58,7 +59,12 @@ class Row:
 
 def source_rows(s: Settings) -> list[Row]:
     """Return the source's dials in use."""
-    return [_row(n, v, "" if v.given else "card's default") for n, v in s.items() if v.active]
+    return [_row(n, v, "" if v.given else "card's default", _typed_digits(v)) for n, v in s.items() if v.active]
+
+
+def _typed_digits(v: Value) -> int:
+    """Return the digits of a dial that was typed as a plain number, six at least."""
+    return max(6, len(Decimal(repr(v.value)).as_tuple().digits)) if isinstance(v.typed, float | int) else 6
 
 
 def target_rows(c: Conversion) -> list[Row]:
@@ -66,7 +72,8 @@ def target_rows(c: Conversion) -> list[Row]:
     book = c.textbook.settings
     used = ((n, v) for n, v in c.settings.items() if v.active and not _is_neutral(c.settings, n, v))
     rows = ((n, v, book[n] if book is not None and n in book else None) for n, v in used)
-    return [_row(n, v, "-" if rule is None or not rule.active else _value(rule)) for n, v, rule in rows]
+    digits = max(c.request.digits or 0, 6)
+    return [_row(n, v, "-" if rule is None or not rule.active else _value(rule), digits) for n, v, rule in rows]
 
 
 def neutral_line(s: Settings) -> str:
@@ -79,14 +86,14 @@ def _is_neutral(s: Settings, name: str, v: Value) -> bool:
     return v.active and v.off and not is_computed(s.equation, name, v.role)
 
 
-def _row(name: str, v: Value, note: str) -> Row:
-    value = _value(v)
+def _row(name: str, v: Value, note: str, digits: int = 6) -> Row:
+    value = _value(v, digits)
     return Row(name, value, unit_of(v), "" if value == "off" else other_units(v), note, v)
 
 
-def _value(v: Value) -> str:
+def _value(v: Value, digits: int = 6) -> str:
     """Return a dial's number; nobody can type the infinity at which a card delivers a dial that is off."""
-    return "off" if v.off and math.isinf(v.value) and not v.given else number(v.value)
+    return "off" if v.off and math.isinf(v.value) and not v.given else number(v.value, digits)
 
 
 def side_title(s: Settings) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -17,7 +18,7 @@ from pidemu.certificate.figures import number
 from pidemu.conversion.convert import convert
 from pidemu.conversion.document import card_versions
 from pidemu.conversion.result import Conversion
-from pidemu.conversion.schema import AsGiven, Asked
+from pidemu.conversion.schema import AsGiven, Asked, Dial
 from pidemu.conversion.signed import Signed, read_signed
 from pidemu.errors import CardNotFoundError, CertificateError, ConversionRefusedError, PidemuError, QuestionError
 
@@ -40,8 +41,10 @@ class Change:
 
     Attributes
     ----------
-    kind : {"conversion", "dial", "option", "verdict", "condition", "action", "bench check", "figure"}
-        What it is.
+    kind : str
+        What it is: ``conversion``, ``dial``, ``dial before``, ``option``, ``verdict``, ``condition``, ``action``, ``bench check``,
+        ``figure`` or, by the same pidemu, what is worded: ``sentence``, ``at the loop``, ``warnings``, ``match``, ``chosen``,
+        ``command``.
     name : str
         Which one; empty where there is but one.
     before, after : str
@@ -191,7 +194,7 @@ def _card(name: str, place: str, card: str, vendors: Sequence[str | Path]) -> Ca
 
 def _again(signed: Signed, source: Card, target: Card) -> Conversion:
     """Return the conversion that the certificate is of, computed today."""
-    asked, figures = signed.request, signed.figures
+    asked, figures = signed.request, signed.certificate
     emulate = figures.get("scan_by_scan") is not None or bool(figures.get("not_emulated"))
     settings = replace(source.settings(_given(asked.source)), lag=asked.source.lag_on_pv)
     try:
@@ -228,7 +231,8 @@ def _outcome(error: PidemuError) -> str:
 def _changes(signed: Signed, c: Conversion) -> Iterator[Change]:
     """Yield what is not as the certificate says, the settings first."""
     now = c.to_dict()
-    yield from _dials(signed, now["to"]["settings"])
+    yield from _dials("dial", signed.to.settings, now["to"]["settings"])
+    yield from _dials("dial before", signed.source.settings, now["from"]["settings"])
     for name in dict.fromkeys([*signed.to.options, *now["to"]["options"]]):
         old, new = signed.to.options.get(name, "none"), now["to"]["options"].get(name, "none")
         if old != new:
@@ -241,21 +245,37 @@ def _changes(signed: Signed, c: Conversion) -> Iterator[Change]:
         yield Change("action", "", signed.action.text, now["action"]["text"])
     yield from _bench_check(signed, now["bench_check"])
     same_program = signed.pidemu == pidemu.__version__
-    yield from (Change("figure", *x) for x in _figures("", signed.figures, now["certificate"], complete=same_program))
+    if same_program:
+        yield from _wording(signed, now)
+    yield from (Change("figure", *x) for x in _figures("", signed.certificate, now["certificate"], complete=same_program))
 
 
 def _verdicts(signed: Signed, c: Conversion) -> tuple[tuple[str, str], tuple[str, str]]:
     return (signed.verdict, signed.refusal), (c.verdict, c.refusal)
 
 
-def _dials(signed: Signed, now: Mapping[str, Mapping[str, Any]]) -> Iterator[Change]:
-    before = signed.to.settings
+def _wording(signed: Signed, now: Mapping[str, Any]) -> Iterator[Change]:
+    """Yield what the same pidemu words otherwise: what to do at the loop, the sentence, what to watch for."""
+    for name in ("sentence", "at_the_loop", "warnings", "match", "chosen", "command"):
+        old, new = getattr(signed, name), now[name]
+        if old != new:
+            yield Change(name.replace("_", " "), "", *_first_difference(old, new))
+
+
+def _first_difference(old: Any, new: Any) -> tuple[str, str]:
+    if not (isinstance(old, list) and isinstance(new, list)):
+        return str(old), str(new)
+    pairs = itertools.zip_longest(old, new, fillvalue="nothing")
+    return next((str(x), str(y)) for x, y in pairs if x != y)
+
+
+def _dials(kind: str, before: Mapping[str, Dial], now: Mapping[str, Mapping[str, Any]]) -> Iterator[Change]:
     for name in dict.fromkeys([*before, *now]):
         old = (before[name].value, before[name].unit) if name in before else None
         new = (now[name]["value"], now[name]["unit"]) if name in now else None
         same = old is not None and new is not None and old[1] == new[1] and _same(float(old[0]), float(new[0]), DIAL, 0.0)
         if not same:
-            yield Change("dial", name, _dial(old), _dial(new))
+            yield Change(kind, name, _dial(old), _dial(new))
 
 
 def _dial(value: tuple[Any, str] | None) -> str:

@@ -189,7 +189,8 @@ def bench_for(
     if not low - rounding <= op <= high + rounding:
         raise ScanError(
             f"{name}: the output of {out.text(op)} is outside the output limits, {out.text(low)} to {out.text(high)}; "
-            "bring it inside before the cut-over, or give the target's own limits as output_limits"
+            "bring it inside before the cut-over, or state the limits that are set (--limits on the command line, output_limits "
+            "here)"
         )
     a = target.algorithm(own_units=True, scan=scan)
     h = default_scan(target.equation) if scan is None else float(scan)

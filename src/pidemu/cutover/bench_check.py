@@ -17,6 +17,7 @@ from pidemu.action import carried_action, switch_position
 from pidemu.canonical import default_scan
 from pidemu.card.base import Rule
 from pidemu.certificate.figures import number
+from pidemu.errors import ScanError
 from pidemu.record.files import Floats
 from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for
@@ -96,7 +97,7 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
     Raises
     ------
     ScanError
-        The controller cannot be run at this interval.
+        The controller cannot be run at this interval, or the smallest step takes its output to a limit.
 
     Examples
     --------
@@ -116,7 +117,9 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
         move = _moved(settings, h, known or "reverse", step if known else -step)
         if max(abs(move.jump), abs(move.kick)) < MOST * span / 100:
             break
-    text = _text(settings, step, move, known)
+    else:
+        raise ScanError("gain or derivative is so large that the smallest step of PV would take the output to a limit")
+    text = _text(settings, step, move, known, h)
     return BenchCheck(text, step, move.jump, move.kick, move.settles, move.ramp, known)
 
 
@@ -171,31 +174,34 @@ def _output_span(settings: Settings) -> float:
     return high - low if high - low < 1e9 else 100.0
 
 
-def _text(settings: Settings, step: float, move: _Move, known: Action | None) -> str:
+def _text(settings: Settings, step: float, move: _Move, known: Action | None, h: float) -> str:
     size = _amount(settings, "pv", step)
     if known:
         how = f"move PV up by {size}"
     else:
         how = f"move PV until the error (SP - PV reverse acting, PV - SP direct acting) is +{size}"
-    return f"In automatic, with PV at SP and the output half way, {how}: the output {_response(settings, move)}."
+    return f"In automatic, with PV at SP and the output half way, {how}: the output {_response(settings, move, h)}."
 
 
-def _response(settings: Settings, move: _Move) -> str:
+def _response(settings: Settings, move: _Move, h: float) -> str:
     """Return what the output does, as the end of a sentence."""
     text = f"{_verb(move.jump)} by {_amount(settings, 'op', move.jump)}" if move.jump else ""
     if move.kick:
         noun = "fall" if move.jump < 0 else "rise"
         rest = f"a {noun} of {_amount(settings, 'op', move.jump)} is left" if move.jump else "it is back"
         text = (
-            f"{_verb(move.kick)} by {_amount(settings, 'op', move.kick)} at first; when the derivative has died out, after "
-            f"{number(move.settles, 2)} s, {rest}"
+            f"{_verb(move.kick)} by {_amount(settings, 'op', move.kick)} at first, at a scan every {number(h)} s; when the "
+            f"derivative has died out, after {number(move.settles, 2)} s, {rest}"
         )
     if not move.ramp:
         return text or "does not move"
-    rate = f"{_verb(move.ramp, 'ing')} at {_amount(settings, 'op', move.ramp)} per minute"
+    pace = f"{_amount(settings, 'op', move.ramp)} per minute"
+    rate = f"{_verb(move.ramp, 'ing')} at {pace}"
     if not text:
         return f"does not jump but begins {rate}"
-    return f"{text}{', and it goes' if move.kick else ' and goes'} on {rate}"
+    if move.kick:  # all the while the integral has been at work
+        return f"{text}, and with it a {'fall' if move.ramp < 0 else 'rise'} of {pace} since the step"
+    return f"{text} and goes on {rate}"
 
 
 def _verb(x: float, ending: str = "s") -> str:

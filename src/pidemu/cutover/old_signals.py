@@ -8,7 +8,7 @@ from typing import Final
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
 from pidemu.range_relation import in_target_units
-from pidemu.ranges import SignalRange
+from pidemu.ranges import PERCENT, SignalRange
 from pidemu.settings import Settings
 
 Signals = tuple[float, float, float]
@@ -39,8 +39,9 @@ def as_the_target_shows(source: Settings, target: Settings, signals: Signals) ->
     new = (target.pv_range, target.pv_range, target.op_range)
     if not all(isfinite(x) for x in signals):
         return signals, ""  # which the plan refuses
-    for name, x, given in zip(_NAMES, signals, old, strict=True):
-        _check(name, x, given)
+    for name, x, given in list(zip(_NAMES, signals, old, strict=True))[:2]:  # the output is held against its limits
+        if given is not None or source.equation.signals == "percent":
+            _check(name, x, given)
     sp, pv, op = (in_target_units(x, a, b) for x, a, b in zip(signals, old, new, strict=True))
     if (sp, pv, op) == tuple(signals):
         return signals, ""
@@ -52,14 +53,20 @@ def as_the_target_shows(source: Settings, target: Settings, signals: Signals) ->
     return (sp, pv, op), f"on the new controller, {shown}"
 
 
-def _check(name: str, x: float, given: SignalRange | None) -> None:
+def in_signal_units(percent: tuple[float, float], given: SignalRange | None) -> tuple[float, float]:
+    """Return two outputs in percent in the units of a range; as they are where none is given."""
     if given is None:
-        return
-    part = 100 * (x - given.low) / given.span
+        return percent
+    low, high = (given.low + x * given.span / 100 for x in percent)
+    return low, high
+
+
+def _check(name: str, x: float, given: SignalRange | None) -> None:
+    part = x if given is None else 100 * (x - given.low) / given.span
     if not -_BEYOND <= part <= 100 + _BEYOND:
         raise ScanError(
-            f"the {name} {_text(x, given)} is outside the old controller's range, {given}; give the signals at the cut-over as the "
-            "old controller shows them"
+            f"the {name} {_text(x, given)} is outside the old controller's range, {given or PERCENT}; give the signals at the "
+            "cut-over as the old controller shows them"
         )
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from pidemu.algorithm import Algorithm
+from pidemu.certificate.noise import noise_gain_of
 from pidemu.law import Law
 
 
@@ -66,7 +65,7 @@ def responses_of(a: Algorithm, scan: float | None = None) -> Responses:
     law = Law(a, scan)
     kick = law.kick("feedback")
     if scan is None:
-        return Responses(kick, law.kick(), abs(kick) or _beyond_the_corner(law))
+        return Responses(kick, law.kick(), noise_gain_of(law))
     fastest = math.pi / scan * (1 - 1e-9)
     return Responses(kick, law.kick(), float(abs(law.response(fastest))))
 
@@ -75,14 +74,3 @@ def ramp_of(a: Algorithm) -> Ramp:
     """Return what a step of the measurement comes to: the first two moments (specs/equations.md, section 2)."""
     slope, jump, _ = Law(a).moments()
     return Ramp(jump, slope)
-
-
-def _beyond_the_corner(law: Law) -> float:
-    """Return the largest gain above the corner of the fastest filter; 0 where there is none."""
-    a = law.algorithm
-    times = [
-        a.Tf if a.has_signal_filter or a.has_term_filter else 0.0,
-        *(f.time for f in (a.pv_filter, a.e_filter) if f is not None),
-    ]
-    fastest = min((t for t in times if t), default=0.0)
-    return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0

@@ -57,6 +57,11 @@ class Scale:
         """Return outputs, or limits, in percent."""
         return _linear(x, self._op, back=False)
 
+    def limits_percent(self, limits: tuple[float, float]) -> tuple[float, float]:
+        """Return output limits in percent."""
+        low, high = self.output_percent(np.array(limits)).tolist()
+        return low, high
+
     def output_own(self, x: float) -> float:
         """Return an output of so many percent in the controller's units."""
         return float(_linear(np.array(x), self._op, back=True))
