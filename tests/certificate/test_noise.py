@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 import pidemu
-from pidemu.certificate.noise import noise_change, noise_gain
+from pidemu.algorithm import Lag
+from pidemu.certificate.noise import noise_change, noise_gain, noise_gain_of
+from pidemu.law import Law
 
 
 def settings(name: str, **dials: Any) -> pidemu.Settings:
@@ -48,6 +51,14 @@ def test_without_a_scan_interval_it_is_the_gain_at_high_frequencies() -> None:
     assert noise_gain(TDC) == pytest.approx(25.0, rel=1e-12)  # K times ten
     assert noise_gain(settings("generic/standard", K=2, Ti=10, Td=0)) == pytest.approx(2.0, rel=1e-12)
     assert noise_gain(settings("generic/standard", K=2, Ti=10, Td=3)) == math.inf
+
+
+def test_above_the_corner_of_a_filter_that_lets_nothing_through_it_is_the_gain_there() -> None:
+    """An I controller behind a PV filter of 2 s: ki/w at the corner, 0.5 rad/s, less 3 dB."""
+    s = settings("generic/parallel", kp=0, ki=0.3)
+    filtered = s.algorithm()
+    law = Law(replace(filtered, pv_filter=Lag(2.0)))
+    assert noise_gain_of(law) == pytest.approx(0.3 / 0.5 / math.sqrt(2), rel=1e-12)
 
 
 def test_the_sentence_names_both_figures_the_reason_and_what_keeps_it_as_it_was() -> None:

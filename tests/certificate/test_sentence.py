@@ -181,7 +181,10 @@ def test_two_that_stay_apart_after_a_limit_are_not_called_alike() -> None:
 
 def test_a_setpoint_that_moves_otherwise_makes_setpoint_changes_different() -> None:
     limited = (NonlinearDifference("setpoint", "setpoint rate limit", {"setpoint rate limit [%/s]": (2.0, math.inf)}),)
-    assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=limited)) == FEEDBACK + FIRST
+    assert (
+        sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=limited))
+        == FEEDBACK + "the two do not limit the rate of the setpoint alike."
+    )
     in_manual = (NonlinearDifference("setpoint", "in manual the setpoint follows the measurement", {}),)
     assert sentence(certificate(scan_by_scan=run(0.0, 0.0), nonlinear=in_manual)) == EXACT
 
@@ -326,3 +329,10 @@ def test_a_conversion_that_makes_the_loop_unstable_says_so() -> None:
     assert abs(before.error[-1]) < 0.1
     assert max(abs(after.error[-20:])) > 1
     assert found.sentence.endswith(UNSTABLE)
+
+
+def test_a_rate_limit_of_the_setpoint_on_one_side_alone_is_named() -> None:
+    dials = {"Kp": 2, "Ki": 0.1, "Kd": 0, "Tf": 0.1, "b": 1, "c": 0, "rRampMax": 1}
+    c = pidemu.convert(pidemu.load_card("gnc-tools/cpid").settings(dials), "generic/parallel")
+    assert c.verdict == "exact-feedback"
+    assert c.sentence.endswith("setpoint changes differ: the two do not limit the rate of the setpoint alike.")

@@ -535,3 +535,9 @@ def test_a_frequency_beyond_half_the_scan_rate_is_refused() -> None:
 def test_a_word_that_names_no_card_is_refused() -> None:
     status, out, err = said("convert", "--from", "nothing", "GAIN=2", "--to", "emerson/deltav")
     assert (status, out, err) == (2, "", "error: no card, vendor or product 'nothing'; 'pidemu cards' lists them\n")
+
+
+def test_digits_beyond_six_are_printed_when_typed_or_asked_for() -> None:
+    out = said("convert", "generic/standard", "K=2.123456789", "Ti=20", "--to", "emerson/deltav", "--digits", "9").out
+    assert "2.123456789" in out
+    assert "2.12345679" in out.replace("2.123456789", "")

@@ -89,6 +89,10 @@ EDITED: dict[str, tuple[tuple[Any, ...], Any, str]] = {
         ("certificate", "setpoint_kick", "source"), "inf", "figure setpoint_kick.source: inf on the certificate, 2 now",
     ),
     "a figure of the bench check": (("bench_check", "jump"), 1.0, "bench check jump: 1 on the certificate, 5.4 now"),
+    "a dial of the old controller": (
+        ("from", "settings", "GAIN", "value"), 3.0, "dial before GAIN: 3 %/% on the certificate, 2 %/% now",
+    ),
+    "what it was matched by": (("match",), "textbook", "match: textbook on the certificate, exact now"),
 }  # fmt: skip
 
 
@@ -104,6 +108,31 @@ def test_an_edited_certificate_is_found_out(name: str) -> None:
     assert [str(c) for c in found.changes] == [said_of_it]
     assert not found.unchanged
     assert "the file was edited" in found.because[0]
+
+
+@pytest.mark.parametrize("name", ["sentence", "at_the_loop", "warnings", "command"])
+def test_edited_words_are_found_out_by_the_pidemu_that_wrote_them(name: str) -> None:
+    plain = signed()
+    before = plain[name]
+    plain[name] = [*before, "Nothing to watch for."] if isinstance(before, list) else "Both are the same."
+    (change,) = pidemu.verify(plain).changes
+    assert change.kind == name.replace("_", " ")
+    assert (change.before, change.after) == (plain[name][-1], "nothing") if isinstance(before, list) else (plain[name], before)
+    assert pidemu.verify(plain | {"pidemu": "0.0.1"}).changes == ()
+
+
+def test_words_that_follow_from_a_card_that_changed_are_not_told_besides(own: Path) -> None:
+    file = own / "fisher" / "provox.yaml"
+    file.write_text(with_another_filter(file.read_text(encoding="utf-8")), encoding="utf-8")
+    kinds = {c.kind for c in pidemu.verify(signed(), vendors=[own]).changes}
+    assert kinds == {"dial", "condition", "bench check", "figure"}
+
+
+def test_a_certificate_without_its_sentence_is_not_a_whole_one() -> None:
+    plain = signed()
+    del plain["sentence"]
+    with pytest.raises(CertificateError, match="sentence: missing"):
+        pidemu.verify(plain)
 
 
 def test_what_another_machine_rounds_otherwise_is_no_change() -> None:

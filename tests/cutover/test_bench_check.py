@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 import pidemu
-from pidemu.cutover.bench_check import STEPS, bench_check
+from pidemu.cutover.bench_check import STEPS, BenchCheck, bench_check
+from pidemu.errors import ScanError
 from tests.cutover.bench import defined, on_every_card
 
 
@@ -95,6 +96,20 @@ def test_the_kick_of_the_derivative_stands_apart_and_the_step_is_small_enough_fo
         "move PV up by 1 %: the output rises by 18.51 % at first, at a scan every 0.2 s; when the derivative has died out, after "
         "2.8 s, a rise of 2.86 % is left, and with it a rise of 5 % per minute since the step."
     )
+
+
+def test_without_a_scan_interval_it_is_worked_out_at_the_one_the_two_were_run_at() -> None:
+    source = settings("generic/standard", K=2, Ti=20, Td=2)
+    check = pidemu.convert(source, "emerson/deltav").bench_check
+    assert isinstance(check, BenchCheck)
+    # K (1 + h/Ti + Td/(alpha Td + h)) at the run's interval of 1 s, alpha the 1/8 that the card begins with, for a step of 5 %
+    assert check.text.count("at a scan every 1 s") == 1
+    assert check.kick == pytest.approx(26.5, rel=1e-12)
+
+
+def test_a_gain_whose_smallest_step_hits_a_limit_is_told_instead_of_a_clipped_figure() -> None:
+    with pytest.raises(ScanError, match="the smallest step of PV would take the output to a limit"):
+        bench_check(settings("generic/standard", K=2e6, Ti=20), 1.0)
 
 
 def test_the_steps_are_also_in_the_signals_own_units_where_their_ranges_are_given() -> None:

@@ -48,6 +48,13 @@ def test_a_plan_is_in_the_new_units_and_says_so() -> None:
     assert plan.is_bumpless
 
 
+@pytest.mark.parametrize("signals", [(500, 50, 40), (50, -11, 40)])
+def test_a_percentage_beyond_the_range_is_noticed_without_a_range(signals: tuple[float, float, float]) -> None:
+    conversion = converted(None, None)
+    with pytest.raises(ScanError, match="is outside the old controller's range, 0 to 100 %"):
+        conversion.transfer_plan(*signals)
+
+
 @pytest.mark.parametrize("signals", [(302, 150, 40), (150, -31, 40)])
 def test_a_signal_in_the_new_units_is_noticed(signals: tuple[float, float, float]) -> None:
     conversion = converted("0,260 degC", "0,600 degF")

@@ -140,7 +140,8 @@ def _scan(c: Conversion) -> Iterator[str]:
             f"The scan intervals differ, {c.scan[0]:g} s and {c.scan[1]:g} s: settings are per second, so do not scale the gain "
             "by their ratio"
         )
-    if c.request.compensate and not c.certificate.compensated:
+    at_scan = c.certificate.feedback_at_scan
+    if c.request.compensate and not c.certificate.compensated and at_scan is not None and not at_scan.is_exact:
         yield "Nothing was compensated: no settings come nearer at these scans, so these are the plain ones"
     if c.certificate.compensated:
         yield (

@@ -43,8 +43,8 @@ class Change:
     ----------
     kind : str
         What it is: ``conversion``, ``dial``, ``dial before``, ``option``, ``verdict``, ``condition``, ``action``, ``bench check``,
-        ``figure`` or, by the same pidemu, what is worded: ``sentence``, ``at the loop``, ``warnings``, ``match``, ``chosen``,
-        ``command``.
+        ``figure`` or, by the same pidemu with the same cards, what is worded: ``sentence``, ``at the loop``, ``warnings``,
+        ``match``, ``chosen``, ``command``.
     name : str
         Which one; empty where there is but one.
     before, after : str
@@ -245,7 +245,7 @@ def _changes(signed: Signed, c: Conversion) -> Iterator[Change]:
         yield Change("action", "", signed.action.text, now["action"]["text"])
     yield from _bench_check(signed, now["bench_check"])
     same_program = signed.pidemu == pidemu.__version__
-    if same_program:
+    if same_program and signed.cards == now["cards"]:  # words follow from these
         yield from _wording(signed, now)
     yield from (Change("figure", *x) for x in _figures("", signed.certificate, now["certificate"], complete=same_program))
 

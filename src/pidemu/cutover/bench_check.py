@@ -117,7 +117,8 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
         move = _moved(settings, h, known or "reverse", step if known else -step)
         if max(abs(move.jump), abs(move.kick)) < MOST * span / 100:
             break
-    else:
+    has_span = settings.equation.signals == "percent" or settings.op_range is not None
+    if has_span and max(abs(move.jump), abs(move.kick)) >= _MIDDLE:
         raise ScanError("gain or derivative is so large that the smallest step of PV would take the output to a limit")
     text = _text(settings, step, move, known, h)
     return BenchCheck(text, step, move.jump, move.kick, move.settles, move.ramp, known)
