@@ -307,3 +307,12 @@ def test_the_lines_for_the_certificate() -> None:
         "  emerson/deltav: 27/10 (1 + 1/(81/4 s)) = (2/15 + 27/10 s)/s",
         "  These are not the same function: coefficients differ by up to 0.26 of their size.",
     )
+
+
+def test_a_share_per_scan_in_front_of_the_block_is_a_lag_that_is_proven() -> None:
+    """A share of 0.8 every 0.05 s is 1/80 s; in floats 0.05 (1 - 0.8)/0.8 is something else."""
+    source = pidemu.load_card("automationdirect/directlogic").settings(GAIN=1, RESET=0, FILTER=0.8, pv_range="0,100 degC")
+    conversion = pidemu.convert(source, "bailey/fc18", assume=True, emulate=False)
+    assert conversion.settings.lag == 0.0125
+    assert conversion.certificate.proof is not None
+    assert conversion.certificate.proof.feedback_equal

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pidemu.action import switch_position
+from pidemu.canonical import default_scan
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
@@ -45,6 +46,7 @@ from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.exact_numbers import as_typed
 from pidemu.ranges import RangeGiven
 from pidemu.record.sampling import Scale
 from pidemu.scan.build import Action
@@ -265,6 +267,16 @@ def _concluded(
     )
 
 
+def _measurement_lag(source: Settings, request: Request) -> float | None:
+    """Return the time of the source's filter on the measurement [s]: of a share per scan that which the decimals as typed make."""
+    h = request.scan[0] if request.scan else None
+    lag = source.algorithm(scan=h).pv_filter
+    if lag is None or lag.factor == 1:
+        return None if lag is None else lag.time
+    share = as_typed(lag.factor)
+    return float(as_typed(default_scan(source.equation) if h is None else h) * (1 - share) / share)
+
+
 class _Work:
     """One conversion: its source, card and request, from which solvers for any choice of the options are made."""
 
@@ -276,8 +288,7 @@ class _Work:
         self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
         self.fixed = {**_shared(source, card), **request.given}
         self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
-        lag = source.algorithm(scan=request.scan[0] if request.scan else None).pv_filter
-        self.source_lag = lag.time if lag is not None and self.aim.match in _PAIRED else None
+        self.source_lag = _measurement_lag(source, request) if self.aim.match in _PAIRED else None
         if request.scan is not None:
             source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
 
