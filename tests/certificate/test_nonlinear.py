@@ -94,9 +94,9 @@ def test_both_may_leave_at_once_and_the_output_after_the_spell_differ() -> None:
         assert at_zero == output[-1]
     assert found.figures[AT_ZERO][1] == 50  # P alone saturates, so that the integral of the PLC-5 never moves
     assert found.text.startswith(
-        "With the valve at 100 % and the error reversing, both controllers leave the limit at once; after 180 s of an error of 32 % "
-        f"the other way and back at zero, the output is {found.figures[AT_ZERO][0]:.4g} % on the old controller and 50 % on the new one, "
-        "until the loop removes the difference."
+        "With the valve at 100 % and the error reversing, both controllers leave the limit at once; after 180 s of an error of "
+        f"32 % the other way and back at zero, the output is {found.figures[AT_ZERO][0]:.4g} % on the old controller and 50 % on "
+        "the new one, until the loop removes the difference."
     )
 
 
