@@ -26,8 +26,8 @@ def printable(text: str) -> str:
 
     Examples
     --------
-    >>> printable("FIC-1\x1b[2J K\u00fchler")
-    'FIC-1\\u001b[2J K\u00fchler'
+    >>> print(printable("FIC-1\x1b[2J Kühler"))
+    FIC-1\u001b[2J Kühler
     """
     return _CONTROL.sub(_escape, text)
 
@@ -44,8 +44,8 @@ def shortened(text: object, most: int = 60) -> str:
 
     Examples
     --------
-    >>> shortened("a\nb" + 100 * "c", most=8)
-    'a\\u000ab…'
+    >>> print(shortened("a\nb" + 100 * "c", most=9))
+    a\u000ab…
     """
     whole = str(text)
     shown = _LINE.sub(_escape, printable(whole[:most]))
