@@ -52,6 +52,11 @@ def shortened(text: object, most: int = 60) -> str:
     return shown if len(whole) <= most and len(shown) <= most else f"{_cut(shown, most - 1)}…"
 
 
+def masked(text: str) -> str:
+    """Return text with a replacement character for each that controls a terminal, so that columns stay where they are."""
+    return _CONTROL.sub("\ufffd", text)
+
+
 def _escape(match: re.Match[str]) -> str:
     return f"\\u{ord(match[0]):04x}"
 

@@ -14,8 +14,8 @@ from pidemu.files.tables import Lines, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.result import HEADER, FleetResult
 from pidemu.loop.process import parse_process
-from pidemu.scan.build import Action
 from pidemu.printable import printable, shortened
+from pidemu.scan.build import Action
 from pidemu.words import assignments, pair, seconds, step
 
 COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
@@ -225,7 +225,8 @@ def _action(text: str) -> Action:
     action = _ACTIONS.get(text.casefold())
     if action is None:
         raise SettingError(
-            f"'{shortened(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
+            f"'{shortened(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative "
+            "feedback"
         )
     return action
 
