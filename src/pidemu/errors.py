@@ -24,21 +24,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
-
-from pidemu.printable import masked, shortened
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pidemu.conversion.questions import Question
     from pidemu.conversion.result import Conversion
-
-
-_SHOWN: Final = 50
-"""Problems of a file that a message lists."""
-_MESSAGE: Final = 1000
-"""Characters of a message about one problem."""
-_EXCERPT: Final = 120
-"""Characters of a line that are shown."""
 
 
 class PidemuError(Exception):
@@ -72,7 +62,7 @@ class Problem:
 
     def headline(self) -> str:
         """Return ``path:line:column: message``."""
-        return f"{shortened(self.path, _MESSAGE)}:{self.line}:{self.column}: {shortened(self.message, _MESSAGE)}"
+        return f"{self.path}:{self.line}:{self.column}: {self.message}"
 
     def render(self) -> str:
         """Return the headline with the lines around and marks under the token, as a compiler prints it."""
@@ -80,21 +70,11 @@ class Problem:
             return self.headline()
         gutter = len(str(self.line + 1)) + 2
         out = [self.headline()]
-        start = max(0, self.column - 1 - _EXCERPT // 2) if len(self.source[self.line - 1]) > _EXCERPT else 0
         for number in range(max(1, self.line - 1), min(len(self.source), self.line + 1) + 1):
-            out.append(f"{number:>{gutter}} | {_excerpt(self.source[number - 1], start)}".rstrip())
+            out.append(f"{number:>{gutter}} | {self.source[number - 1]}".rstrip())
             if number == self.line:
-                room = _EXCERPT - (self.column - 1 - start)
-                out.append(" " * gutter + " | " + " " * (self.column - 1 - start) + "^" * max(1, min(self.width, room)))
+                out.append(" " * gutter + " | " + " " * (self.column - 1) + "^" * max(1, self.width))
         return "\n".join(out)
-
-
-def _excerpt(line: str, start: int) -> str:
-    """Return what is shown of a line from a column on, with an ellipsis where it is cut."""
-    end = start + _EXCERPT
-    shown = masked(line[start:end])
-    shown = f"…{shown[1:]}" if start and shown else shown
-    return f"{shown[:-1]}…" if len(line) > end else shown
 
 
 class CardError(PidemuError):
@@ -108,9 +88,7 @@ class CardError(PidemuError):
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        shown = [p.render() for p in self.problems[:_SHOWN]]
-        more = len(self.problems) - len(shown)
-        super().__init__("\n".join([*shown, *([f"and {more:,} more problems"] if more > 0 else [])]))
+        super().__init__("\n".join(p.render() for p in self.problems))
 
 
 class CardNotFoundError(CardError):

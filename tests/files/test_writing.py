@@ -156,7 +156,7 @@ def test_the_standard_output_goes_on_where_it_is_though_it_be_a_file(tmp_path: P
 def test_what_cannot_be_written_is_said_before_the_work_and_at_its_end(tmp_path: Path) -> None:
     assert message(tmp_path) == f"{tmp_path}: cannot be written: it is a folder"
     assert message(tmp_path / "no" / "a") == f"{tmp_path / 'no' / 'a'}: cannot be written: No such file or directory"
-    assert message("a\0b") == "a\\u0000b: cannot be written: no file can have this name"
+    assert message("a\0b") == "a\\x00b: cannot be written: no file can have this name"
     assert names(tmp_path) == []
 
 

@@ -106,7 +106,7 @@ def test_without_a_column_the_recorded_output_is_the_operator_s(tmp_path: Path) 
         ("sp,pv\n1,2\u20281,2\n", ":2:4: U+2028, a line separator, stands in the text; remove it"),
         ("\ufeff\ufeffsp,pv\n1,2\n", ":1:1: U+FEFF, a byte order mark that is not the first, stands in the text; remove it"),
         ("sp,pv\n1," + "2" * 131_073, ":2: a cell has more than 131,072 characters; shorten it"),
-        ("sp,pv\n1," + "x" * 1000, f":2: column pv: '{59 * 'x'}…' is not a number"),
+        ("sp,pv\n1," + "x" * 1000, f":2: column pv: '{40 * 'x'}…{20 * 'x'}' is not a number"),
         ('sp,pv,note\n1,2,"a\nb"\n', ":2: a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
         ("sp,pv,FF\n1,2,inf\n", ":2: column FF: 'inf' is not a finite number; leave the cell empty where there is no signal"),
         ("sp,pv,cas\n1,2,on\n", ":2: column cas: 'on' is not a number"),

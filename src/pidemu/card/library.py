@@ -8,8 +8,6 @@ from pathlib import Path
 
 from pidemu.card.load import Card, load_file
 from pidemu.errors import CardError, CardNotFoundError, suggest
-from pidemu.files.reading import is_file, is_folder
-from pidemu.printable import shortened
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
@@ -43,8 +41,8 @@ def folders(extra: Sequence[str | Path] = ()) -> list[Path]:
     """
     named = [Path(f) for f in extra] + [Path(f) for f in os.environ.get(ENVIRONMENT, "").split(os.pathsep) if f]
     for folder in named:
-        if not is_folder(folder):
-            raise CardNotFoundError(f"no folder '{shortened(folder, 200)}'; a folder of cards holds <vendor>/<block>.yaml")
+        if not folder.is_dir():
+            raise CardNotFoundError(f"no folder '{folder}'; a folder of cards holds <vendor>/<block>.yaml")
     return [*named, builtin_folder()]
 
 
@@ -95,13 +93,13 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     file = Path(name) if name.endswith((".yaml", ".yml")) else None
     card_id = name if file is None else None
     if file is None:
-        file = next((f for d in folders(vendors) if is_file(f := d / f"{name}.yaml")), None) if _is_id(name) else None
+        file = next((f for d in folders(vendors) if (f := d / f"{name}.yaml").is_file()), None) if _is_id(name) else None
         if file is None:
             known = cards(vendors)
             hint = suggest(name, known) or _suggest_block(name, known)
-            raise CardNotFoundError(f"no card '{shortened(name, 200)}'{hint}; 'pidemu cards' lists them")
-    elif not is_file(file):
-        raise CardNotFoundError(f"no file '{shortened(name, 200)}'")
+            raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
+    elif not file.is_file():
+        raise CardNotFoundError(f"no file '{name}'")
     key, changed = (file.absolute(), card_id), file.stat().st_mtime_ns
     kept = _loaded.get(key)
     if kept is None or kept[0] != changed:
@@ -117,7 +115,7 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
         card = load_file(file, card_id)
     except CardError as error:
         return error
-    if Path(os.path.realpath(file)).is_relative_to(os.path.realpath(builtin_folder())):
+    if file.resolve().is_relative_to(builtin_folder().resolve()):
         return card
     from pidemu.checks import check  # the rules run a card, and everything that runs one depends on cards
 

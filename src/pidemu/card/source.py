@@ -16,8 +16,8 @@ from typing import Any, Final
 import yaml
 
 from pidemu.errors import CardError, Problem
+from pidemu.excerpt import visible
 from pidemu.files.reading import Kind, read_text
-from pidemu.printable import printable
 
 Path_ = tuple[str | int, ...]
 """Keys and indices that lead to a value."""
@@ -25,8 +25,6 @@ Path_ = tuple[str | int, ...]
 _Loader: Final[Any] = getattr(yaml, "CLoader", yaml.Loader)
 _MAX_DEPTH: Final = 32
 CARD: Final = Kind("a card", "a card starts with 'card: 1'", limit=2**22, pipes=False)
-_KEYS: Final = ("card", "vendor", "product", "algorithm")
-"""Keys by which a card is known, whatever else is wrong with it."""
 
 _INT: Final = re.compile(r"[-+]?[0-9]+$")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
@@ -217,7 +215,7 @@ def parse(text: str, path: str, kind: Kind = CARD) -> Document:
     return document
 
 
-def parse_file(file: Path, shown: str | None = None, kind: Kind = CARD, keys: tuple[str, ...] = _KEYS) -> Document:
+def parse_file(file: Path, shown: str | None = None, kind: Kind = CARD) -> Document:
     """Read one YAML file.
 
     Parameters
@@ -228,22 +226,11 @@ def parse_file(file: Path, shown: str | None = None, kind: Kind = CARD, keys: tu
         Its name in messages; by default `file` itself.
     kind : Kind
         What the file should be.
-    keys : tuple of str
-        Keys by which it is known; of a file with none of them no line is shown, since it may be anything.
 
     Raises
     ------
     CardError
         It cannot be read, is not UTF-8, or is wrong (see `parse`).
     """
-    name = printable(shown or str(file))
-    text = read_text(file, CardError, kind, shown=name)
-    known = re.search(rf"""^[ \t{{-]*["']?({"|".join(keys)})["']?[ \t]*:""", text, re.MULTILINE)
-    if known is None and _says_something(text):
-        raise CardError([Problem(name, 1, 1, f"not {kind.name}; {kind.remedy}")])
-    return parse(text, name, kind)
-
-
-def _says_something(text: str) -> bool:
-    """Whether there is more than comments, blank lines and marks of a document."""
-    return any(line.strip() and not line.lstrip().startswith(("#", "---", "...")) for line in text.split("\n"))
+    name = visible(shown or str(file))
+    return parse(read_text(file, CardError, kind, shown=name), name, kind)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-from typing import Final
 
 import click
 
@@ -12,11 +10,6 @@ from pidemu.card.library import card_files
 from pidemu.checks import check_file
 from pidemu.cli.common import json_option, print_json, vendors_option
 from pidemu.errors import CardNotFoundError, Problem
-from pidemu.files.reading import is_file, is_folder
-from pidemu.printable import printable
-
-_SHOWN: Final = 200
-"""Problems that are printed."""
 
 
 @click.command("check", short_help="Check cards, the built-in ones or those given.")
@@ -35,10 +28,8 @@ def command(paths: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> 
     if as_json:
         print_json([{"path": p.path, "line": p.line, "column": p.column, "message": p.message} for p in problems])
     else:
-        for problem in problems[:_SHOWN]:
+        for problem in problems:
             click.echo(problem.render(), err=True)
-        if len(problems) > _SHOWN:
-            click.echo(f"and {len(problems) - _SHOWN:,} more problems; --json lists all", err=True)
         count = len(problems)
         click.echo(f"{len(files)} card{'' if len(files) == 1 else 's'}, {count} problem{'' if count == 1 else 's'}")
     if problems:
@@ -46,19 +37,18 @@ def command(paths: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> 
 
 
 def _files(path: Path) -> list[Path]:
-    shown = printable(str(path))
-    if is_folder(path):
+    if path.is_dir():
         found = sorted(path.rglob("*.yaml"))
         if not found:
-            raise CardNotFoundError(f"no .yaml file below '{shown}'")
+            raise CardNotFoundError(f"no .yaml file below '{path}'")
         return found
-    if not is_file(path):
-        raise CardNotFoundError(f"no file or folder '{shown}'")
+    if not path.is_file():
+        raise CardNotFoundError(f"no file or folder '{path}'")
     return [path]
 
 
 def _shown(file: Path) -> str:
     try:
-        return Path(os.path.realpath(file)).relative_to(Path.cwd()).as_posix()  # unlike Path.resolve, it bears a loop of links
-    except (ValueError, OSError):
+        return file.resolve().relative_to(Path.cwd()).as_posix()
+    except ValueError:
         return str(file)

@@ -14,8 +14,8 @@ from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
+from pidemu.excerpt import visible
 from pidemu.files.reading import Kind, is_folder
-from pidemu.printable import printable
 
 Interval = Annotated[
     Annotated[Number, Tag("one")] | Annotated[list[Number], Field(min_length=1, max_length=2), Tag("two")],
@@ -93,8 +93,8 @@ def read_loop(file: Path) -> Loop:
         The file is missing, or wrong: every problem, located.
     """
     if not os.path.exists(file) or is_folder(file):
-        raise CardNotFoundError(f"no file '{printable(str(file))}'")
-    document = parse_file(file, kind=_KIND, keys=("card", "settings"))
+        raise CardNotFoundError(f"no file '{visible(str(file))}'")
+    document = parse_file(file, kind=_KIND)
     try:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:

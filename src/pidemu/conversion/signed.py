@@ -14,8 +14,9 @@ import pidemu
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.schema import ConversionPart
 from pidemu.errors import CertificateError
+from pidemu.excerpt import visible
+from pidemu.files.quoting import quoted
 from pidemu.files.reading import Kind, read_text
-from pidemu.printable import printable, shortened
 
 LARGEST: Final = 16 * 2**20
 """Size of a file beyond which it is not read [bytes]; a certificate has some 50 kB."""
@@ -46,7 +47,7 @@ def read_signed(source: str | Path | Mapping[str, Any]) -> tuple[str, Signed]:
     """
     if isinstance(source, Mapping):
         return "certificate", _checked("certificate", dict(source))
-    name = printable(str(source))
+    name = visible(str(source))
     return name, _checked(name, _parsed(name, read_text(source, CertificateError, _KIND, controls=False)))
 
 
@@ -73,7 +74,7 @@ def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"the key '{shortened(key)}' stands twice in one place")
+            raise ValueError(f"the key '{quoted(key)}' stands twice in one place")
         found[key] = value
     return found
 
@@ -84,7 +85,7 @@ def _checked(name: str, plain: Any) -> Signed:
         raise CertificateError(f'{name}: not a certificate, as it does not begin with "schema": "{SCHEMA}"; {_AGAIN}')
     if form != SCHEMA:
         raise CertificateError(
-            f"{name}: schema: the form is '{shortened(form)}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with "
+            f"{name}: schema: the form is '{quoted(form)}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with "
             "the pidemu that wrote it, or convert again"
         )
     if plain.get("verdict") in ("question", "refused"):
@@ -109,9 +110,9 @@ def _fault(error: ErrorDetails, plain: Any) -> str:
         )
         if inside:
             value = value[step]
-            path.append(shortened(step))
+            path.append(quoted(step))
     if error["type"] == "missing":
-        return f"{'.'.join([*path, shortened(error['loc'][-1])])}: missing"
+        return f"{'.'.join([*path, quoted(error['loc'][-1])])}: missing"
     place = ".".join(path)
     if error["type"] == "extra_forbidden":
         return f"{place}: an unknown key"
@@ -122,4 +123,4 @@ def _fault(error: ErrorDetails, plain: Any) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return "a list" if isinstance(value, list) else "a group of keys"
-    return shortened(json.dumps(value))
+    return quoted(json.dumps(value))

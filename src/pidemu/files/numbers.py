@@ -6,7 +6,7 @@ import math
 import re
 from typing import Final
 
-from pidemu.printable import shortened
+from pidemu.files.quoting import quoted
 
 _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?")
@@ -40,14 +40,14 @@ def plain_number(text: str, *, words: bool = False) -> float:
     if _PLAIN.fullmatch(text):
         value = float(text)
         if math.isinf(value):
-            raise ValueError(f"'{shortened(text)}' is too large a number")
+            raise ValueError(f"'{quoted(text)}' is too large a number")
         return value
     if words and _WORDS.fullmatch(text):
         return float(text)
     if _WITH_COMMA.fullmatch(text):
-        raise ValueError(f"'{shortened(text)}' has a comma; write a decimal point")
+        raise ValueError(f"'{quoted(text)}' has a comma; write a decimal point")
     try:
         float(text)
     except ValueError:
-        raise ValueError(f"'{shortened(text)}' is not a number") from None
-    raise ValueError(f"'{shortened(text)}' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3")
+        raise ValueError(f"'{quoted(text)}' is not a number") from None
+    raise ValueError(f"'{quoted(text)}' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3")

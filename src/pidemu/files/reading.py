@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from pidemu.errors import CardError, PidemuError, Problem
+from pidemu.excerpt import visible
 from pidemu.files.kinds import other_encoding, other_kind
-from pidemu.printable import printable
 
 _BOM: Final = "\ufeff"
 _CONTROL: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
@@ -75,7 +75,7 @@ def read_text(path: str | Path, error: type[PidemuError], kind: Kind, *, shown: 
         Of the class `error`, in one line: the file cannot be read, is too large, is no text, or not UTF-8, or holds a control
         character: with line and column.
     """
-    name = printable(str(path) if shown is None else shown)
+    name = visible(str(path) if shown is None else shown)
     data = _bytes(path, name, error, kind)
     other = other_kind(data)
     if other is not None:

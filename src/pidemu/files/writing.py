@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import IO, Any, BinaryIO, Final, Literal, NoReturn, TextIO, overload
 
 from pidemu.errors import PidemuError
+from pidemu.excerpt import visible
 from pidemu.files.reading import reason
-from pidemu.printable import printable
 
 _FULL: Final = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG")} - {None}
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -75,7 +75,7 @@ def check(path: str | Path, error: type[PidemuError], inputs: Iterable[str | Pat
     PidemuError
         Of the class `error`.
     """
-    name = printable(str(path))
+    name = visible(str(path))
     with _told(name, error):
         target = _target(path, name, error, tuple(inputs))
         if target is not None:
@@ -85,7 +85,7 @@ def check(path: str | Path, error: type[PidemuError], inputs: Iterable[str | Pat
 
 @contextlib.contextmanager
 def _beside(path: str | Path, error: type[PidemuError], inputs: tuple[str | Path, ...], binary: bool) -> Iterator[IO[Any]]:
-    name = printable(str(path))
+    name = visible(str(path))
     with _told(name, error):
         target = _target(path, name, error, inputs)
         if target is None:
@@ -106,7 +106,7 @@ def _beside(path: str | Path, error: type[PidemuError], inputs: tuple[str | Path
     try:
         os.replace(unfinished, target)
     except OSError as fault:  # the work is not lost: it is there under the other name
-        raise error(f"{name}: cannot be replaced: {reason(fault)}; the result is in {printable(str(unfinished))}") from None
+        raise error(f"{name}: cannot be replaced: {reason(fault)}; the result is in {visible(str(unfinished))}") from None
     _settle(target.parent)
 
 
@@ -141,7 +141,7 @@ def _target(path: str | Path, name: str, error: type[PidemuError], inputs: tuple
     for one in inputs:
         with contextlib.suppress(OSError, ValueError):
             if os.path.samestat(found, os.stat(one)):
-                raise error(f"{name}: is read, too, as {printable(str(one))}; give another file for the result")
+                raise error(f"{name}: is read, too, as {visible(str(one))}; give another file for the result")
     if _standard(found) is not None:
         return None
     with open(path, "r+b"):  # the file itself is protected, or another program keeps it

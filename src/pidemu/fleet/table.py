@@ -9,12 +9,13 @@ from typing import Any, Final
 
 from pidemu.card.library import folders, load_card
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
+from pidemu.excerpt import visible
+from pidemu.files.quoting import quoted
 from pidemu.files.reading import Kind, control, read_text
 from pidemu.files.tables import Lines, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.result import HEADER, FleetResult
 from pidemu.loop.process import parse_process
-from pidemu.printable import printable, shortened
 from pidemu.scan.build import Action
 from pidemu.words import assignments, pair, seconds, step
 
@@ -74,7 +75,7 @@ class LoopTable:
 
     def located(self, line: int, tag: str, reason: str) -> str:
         """Return a message with the place it is about: ``loops.csv:7: FIC-101: reason``."""
-        return ": ".join(part for part in (f"{printable(self.path)}:{line}", shortened(tag), shortened(reason, 2000)) if part)
+        return ": ".join(part for part in (f"{visible(self.path)}:{line}", quoted(tag), quoted(reason, 2000)) if part)
 
     def rows(self, result: FleetResult | None) -> Iterator[dict[str, Any]]:
         """Yield a row per row of the file, with its line and the names of a result's table; what is not known is ``None``.
@@ -144,7 +145,7 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
     try:
         header = _header(_cells(names, delimiter))
     except FleetError as error:
-        raise FleetError(f"{printable(str(path))}:{head}: {error}") from None
+        raise FleetError(f"{visible(str(path))}:{head}: {error}") from None
     loops: list[Loop] = []
     numbers: list[int] = []
     wrong: list[WrongRow] = []
@@ -170,7 +171,7 @@ def _lines(path: str | Path) -> Lines:
     lines = split_lines(read_text(path, FleetError, _KIND, controls=False), empty=" \t,;")
     if len(lines.rows) < 2:
         wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
-        raise FleetError(f"{printable(str(path))}: no loops; {wanted}")
+        raise FleetError(f"{visible(str(path))}: no loops; {wanted}")
     return lines
 
 
@@ -189,7 +190,7 @@ def _header(cells: Sequence[str]) -> list[str]:
     names = [cell.casefold() for cell in cells]
     unknown = [cell for cell, name in zip(cells, names, strict=True) if name not in COLUMNS]
     if unknown:
-        which = shortened(", ".join(f"'{shortened(cell)}'{suggest(cell, COLUMNS)}" for cell in unknown), 400)
+        which = quoted(", ".join(f"'{quoted(cell)}'{suggest(cell, COLUMNS)}" for cell in unknown), 400)
         raise FleetError(f"unknown column{'s' if len(unknown) > 1 else ''} {which}; columns: {', '.join(COLUMNS)}")
     missing = [name for name in _REQUIRED if name not in names]
     if missing:
@@ -225,8 +226,7 @@ def _action(text: str) -> Action:
     action = _ACTIONS.get(text.casefold())
     if action is None:
         raise SettingError(
-            f"'{shortened(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative "
-            "feedback"
+            f"'{quoted(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
         )
     return action
 

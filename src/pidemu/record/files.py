@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import RecordError, suggest
+from pidemu.excerpt import visible
 from pidemu.files.numbers import plain_number
+from pidemu.files.quoting import quoted
 from pidemu.files.reading import Kind, read_text
 from pidemu.files.tables import split_lines, split_row, write_rows
-from pidemu.printable import printable, shortened
 
 Floats = npt.NDArray[np.float64]
 
@@ -125,7 +126,7 @@ def read_record(path: str | Path) -> Record:
         The file cannot be read, lacks a column, or holds what is not a number: with line and column name.
     """
     lines = split_lines(read_text(path, RecordError, _KIND))
-    shown = printable(str(path))
+    shown = visible(str(path))
     if len(lines.rows) < 2:
         raise RecordError(f"{shown}: no samples; a record has a header line such as sp,pv and one line per scan")
     table = [(i, _row(f"{shown}:{i}", line)) for i, line in lines.rows]
@@ -167,7 +168,7 @@ def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
     for name in ("sp", "pv"):
         if name not in places:
             split = "; the cells are separated by semicolons, save the file with commas" if ";" in "".join(header) else ""
-            among = shortened(", ".join(header), 200)
+            among = quoted(", ".join(header), 200)
             raise RecordError(f"{path}:{line}: no column '{name}' among {among}{suggest(name, header)}{split}")
     return places
 
@@ -198,7 +199,7 @@ def _yes_or_no(where: str, text: str, name: str) -> float:
     if word in _TRUE or word in _FALSE:
         return float(word in _TRUE)
     meaning = ("automatic", "manual") if name == "auto" else ("hold", "no hold")
-    raise RecordError(f"{where}: '{shortened(text)}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
+    raise RecordError(f"{where}: '{quoted(text)}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
 
 
 def _times(cells: Iterable[tuple[str, str]]) -> Floats:
@@ -210,7 +211,7 @@ def _times(cells: Iterable[tuple[str, str]]) -> Floats:
         if isinstance(x, datetime) and isinstance(first, datetime):
             out.append((x - first).total_seconds())
         elif isinstance(x, datetime) or isinstance(first, datetime):
-            raise RecordError(f"{where}: '{shortened(text)}' is not like the cells above; write seconds or timestamps throughout")
+            raise RecordError(f"{where}: '{quoted(text)}' is not like the cells above; write seconds or timestamps throughout")
         else:
             out.append(x)
     return np.array(out)
@@ -223,7 +224,7 @@ def _time(where: str, text: str) -> float | datetime:
         stamp = datetime.fromisoformat(text)
     except ValueError:
         wanted = "a number of seconds nor a timestamp such as 2026-11-22T08:00:05"
-        raise RecordError(f"{where}: '{shortened(text)}' is neither {wanted}") from None
+        raise RecordError(f"{where}: '{quoted(text)}' is neither {wanted}") from None
     return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)  # a clock change is no gap
 
 
