@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from pidemu.errors import SettingError, UnitError
-from pidemu.files.numbers import plain_number
 from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
@@ -43,7 +42,7 @@ def pair(text: str) -> tuple[float, float]:
         They are not two numbers.
     """
     try:
-        low, high = (plain_number(x.strip(), words=True) for x in text.split(","))
+        low, high = (float(x) for x in text.split(","))
     except ValueError:
         raise SettingError(f"'{text}' is not two numbers such as 0,200") from None
     return low, high
@@ -74,6 +73,6 @@ def step(text: str) -> float | tuple[float, float]:
     """
     when, comma, size = text.rpartition(",")
     try:
-        return (seconds(when), plain_number(size.strip())) if comma else plain_number(text.strip())
+        return (seconds(when), float(size)) if comma else float(text)
     except (ValueError, SettingError):
         raise SettingError(f"'{text}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5") from None

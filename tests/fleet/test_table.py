@@ -136,10 +136,6 @@ WRONG["# FIC-2 is out of service"] = "1 cells, the header has 10; comments stand
 WRONG["#REF!,generic/standard,K=2; Ti=10,,,,,,,"] = "no process; every loop needs one"
 WRONG["A\x00,generic/standard,K=2; Ti=10,gain=1,,,,,,"] = "column 2: U+0000, NUL, stands in the text; remove it"
 WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,,,\u2028B,,"] = "column 43: U+2028, a line separator, stands in the text; remove it"
-WRONG['A,generic/standard,K=2; Ti=10,gain=1,,,"0,1_00",,,'] = "limits: '0,1_00' is not two numbers such as 0,200"
-WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,\u0661,,"] = (
-    "setpoint: '\u0661' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
-)
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))
@@ -189,12 +185,6 @@ def test_a_file_without_loops_or_that_is_no_text_is_refused(tmp_path: Path) -> N
         read_loops(tmp_path / "none.csv")
     with pytest.raises(CardNotFoundError, match="no folder 'nowhere'"):
         read_loops(path, vendors=["nowhere"])
-
-
-def test_limits_that_stand_the_wrong_way_round_are_the_fault_of_their_row(tmp_path: Path) -> None:
-    table = read(tmp_path, GOOD, 'A,generic/standard,K=2; Ti=10,gain=1,,,"100,0",,,')
-    result = pidemu.Fleet(table.loops).simulate(engine="python")
-    assert result.failures == {"A": "output limits 100 to 0 are not a range; give low, then high"}
 
 
 def test_a_tag_that_a_spreadsheet_would_compute_is_written_as_text_and_read_as_it_was(tmp_path: Path) -> None:
