@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,17 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, Process
+from pidemu.cache import warn
 from pidemu.checks.runs import plausible
 from pidemu.engines import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
 from pidemu.errors import EngineError
+from pidemu.loop.hold import Plant
+from pidemu.loop.simulation import _scan_by_scan
 from pidemu.loop.trial import trial
 from pidemu.scan.program import Program, Structure
 from pidemu.targets import numba
 from pidemu.targets.python import starting
+from pidemu.targets.runner import Runner
 from tests.fleet.support import EVERY_ENGINE, alike
 
 PROCESS = Process.from_lags(1.1, [7, 2], delay=1.3)
@@ -206,6 +211,98 @@ def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(
         state = fresh(alone)
         assert np.array_equal(found[:, :, i], runner(alone, "python").run(state, [sp[:, i].copy(), load[:, i].copy()], scans))
         assert states[:, i].tolist() == state[: len(program.states)]
+
+
+@pytest.mark.parametrize("engine", EVERY_ENGINE)
+@pytest.mark.parametrize("lags", [11, 12, 30])
+def test_a_process_of_many_lags_has_the_numbers_of_the_emulator_scan_by_scan(engine: Engine, lags: int) -> None:
+    process = Process.from_lags(1.0, [1 + i / 3 for i in range(lags)], delay=2.25)
+    made = trial(alike(1)[0].settings, process, 0.5, time=60)
+    pv, out = _scan_by_scan(made.controller(), Plant(process.sampled(0.5)), made.setpoint, made.load, made.initial)
+    found = pidemu.simulate(made.settings, process, 0.5, time=60, engine=engine)
+    assert found.measurement.tolist() == pv.tolist()
+    assert found.output.tolist() == out.tolist()
+    program = made.program(made.controller())
+    names = [q.name for q in program.inputs + program.coefficients + program.states] + [line.name for line in program.lines]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "python"])  # the compilers take seconds for as much
+@pytest.mark.parametrize("scans", [500, 1000])
+def test_a_history_of_a_thousand_outputs_has_the_same_bits_in_every_engine(engine: Engine, scans: int) -> None:
+    settings = pidemu.load_card("generic/dahlin").settings({"Kp": 1, "tau": 100, "theta": scans, "lambda": 50})
+    process = Process.from_lags(1.0, [100.0], delay=scans)
+    asked: dict[str, Any] = {"time": 2.5 * scans, "load": (scans / 4, 20.0)}
+    made = trial(settings, process, 1.0, **asked)
+    pv, out = _scan_by_scan(made.controller(), Plant(process.sampled(1.0)), made.setpoint, made.load, made.initial)
+    result = Fleet([pidemu.Loop("A", settings, process, 1.0)]).simulate(**asked, engine=engine, keep=True)
+    assert result.counts == {"done": 1}
+    assert result.engines == [engine]
+    assert result["A"].output.tolist() == out.tolist()
+    assert result["A"].measurement.tolist() == pv.tolist()
+
+
+# --- where an engine fails --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def failures(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFixture]:
+    """What is said about engines that fail; what is broken here works again afterwards."""
+    monkeypatch.setattr("pidemu.engines._BROKEN", set())
+    warn.cache_clear()
+    yield caplog
+    warn.cache_clear()
+
+
+def broken(*args: Any, **named: Any) -> Any:
+    raise ImportError("numba needs another NumPy\nmore of that")
+
+
+SAID = "note: the engine 'numba' failed (ImportError: numba needs another NumPy); plain Python runs what it was to run"
+
+
+@pytest.mark.parametrize("when", ["at once", "when it is called"])
+def test_an_engine_that_fails_and_was_not_asked_for_is_replaced_with_one_line(
+    when: str, compiled: dict[str, bool], failures: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled |= {"loaded": True}
+    program = loop_program()
+    expected = pidemu.simulate(alike(1)[0].settings, PROCESS, 0.5, time=20_000, engine="python")
+    made = Runner(broken, broken, tuple(q.name for q in program.inputs))
+    monkeypatch.setattr(numba, "runner", broken if when == "at once" else lambda program: made)
+    for _ in range(2):
+        found = pidemu.simulate(alike(1)[0].settings, PROCESS, 0.5, time=20_000)
+        assert found.output.tolist() == expected.output.tolist()
+    assert failures.messages == [SAID]
+    assert found.engine == Choice("python", "Numba does not work here")
+    assert for_loops(program.structure, 10**5, 10**4) == Choice("numpy", "many loops, and Numba does not work here")
+
+
+def test_an_engine_that_was_asked_for_and_fails_is_an_error(
+    failures: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(numba, "runner", broken)
+    with pytest.raises(ImportError, match="numba needs another NumPy"):
+        pidemu.simulate(alike(1)[0].settings, PROCESS, 0.5, time=100, engine="numba")
+    assert failures.messages == []
+
+
+def test_a_controller_goes_on_in_python_where_the_engine_fails(
+    compiled: dict[str, bool], failures: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled |= {"loaded": True}
+    pv = 50 + np.sin(np.arange(20_000) / 9)
+    expected = pidemu.Controller(alike(1)[0].settings, 0.5, engine="python").run(50.0, pv)
+    monkeypatch.setattr(numba, "runner", broken)
+    assert pidemu.Controller(alike(1)[0].settings, 0.5).run(50.0, pv).tolist() == expected.tolist()
+    assert failures.messages == [SAID]
+
+
+def test_a_structure_that_takes_long_to_compile_is_weighed_as_that(compiled: dict[str, bool]) -> None:
+    structure = loop_program().structure
+    long = structure._replace(body=structure.body * 300)
+    assert for_loops(structure, 10_000, 2_400).engine == "numba"
+    assert for_loops(long, 10_000, 2_400).engine == "numpy"  # it would take minutes
 
 
 def test_a_run_in_python_imports_no_compiler() -> None:

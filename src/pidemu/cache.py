@@ -1,51 +1,188 @@
-"""The folder for generated code: what a back end compiled once is there the next time."""
+"""The folder for generated code: what a back end compiled once is there the next time, and nothing else is ever loaded from it.
+
+Compiled code runs when it is loaded. So the folder is one that nobody else can write to, its files are this user's own, and the
+name of each holds the SHA-256 of what is in it: one that is damaged, cut short or put there by another is not loaded but made anew.
+"""
 
 from __future__ import annotations
 
 import atexit
 import functools
+import hashlib
+import logging
 import os
 import shutil
+import stat
 import tempfile
 from pathlib import Path
+from typing import Final
 
 from pidemu import __version__
+
+_LOG: Final = logging.getLogger("pidemu")
 
 
 @functools.cache
 def folder() -> Path:
-    """Return the folder for generated code of this version of pidemu; it exists and can be written.
+    """Return the folder for generated code of this version of pidemu; it exists, can be written, and only by this user.
 
     It is that of the environment variable ``PIDEMU_CACHE``, or the user's cache folder where the system has one; where that cannot
-    be written, a folder among the temporary files, for this process alone and removed at its end.
+    be written, or others can write to it, a folder among the temporary files, for this process alone and removed at its end.
+
+    Raises
+    ------
+    OSError
+        There is no room for a temporary folder either.
     """
     import platformdirs
 
     try:
         chosen = os.environ.get("PIDEMU_CACHE") or platformdirs.user_cache_dir("pidemu", appauthor=False)
-        path = Path(chosen).expanduser().absolute() / __version__
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            return path
-    except (OSError, RuntimeError):  # the latter where the user has no home
-        path = Path(tempfile.mkdtemp(prefix="pidemu-"))
-        atexit.register(shutil.rmtree, path, ignore_errors=True)
-        return path
+        path = _made(Path(os.path.realpath(Path(chosen).expanduser())) / __version__)
+        fault = _fault(path)
+        if fault:
+            warn(f"{chosen}: not used for compiled code, as {fault}; name a folder of your own in PIDEMU_CACHE")
+        else:
+            with tempfile.TemporaryFile(dir=path):
+                return path
+    except (OSError, RuntimeError, ValueError):  # without a home it is a RuntimeError, with a NUL in the name a ValueError
+        pass
+    path = Path(tempfile.mkdtemp(prefix="pidemu-"))
+    atexit.register(shutil.rmtree, path, ignore_errors=True)
+    return path
 
 
-def written(name: str, text: str) -> Path:
-    """Return the path of a file of the folder that holds a text; it is written where it is not there yet.
+def load(stem: str, suffix: str) -> tuple[Path, bytes] | None:
+    """Return a file of the folder and what it holds, or ``None``; one that does not hold what its name says is removed.
 
     Parameters
     ----------
-    name : str
-        The file's name, which tells its text: it is not written again.
-    text : str
-        What it holds.
+    stem, suffix : str
+        What it was kept under.
     """
-    path = folder() / name
-    if not path.exists():
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=path.suffix, encoding="utf-8", delete=False) as file:
-            file.write(text)
-        os.replace(file.name, path)  # at once: another process never reads half a file
+    for path in _candidates(stem, suffix):
+        data = _own(path)
+        if data is not None and path.name == _name(stem, suffix, data):
+            return path, data
+        _remove(path)
+    return None
+
+
+def is_kept(stem: str, suffix: str) -> bool:
+    """Tell whether there is a file of this name; what it holds is looked at when it is loaded.
+
+    Parameters
+    ----------
+    stem, suffix : str
+        What it was kept under; the stem may end in ``*``.
+    """
+    return bool(_candidates(stem, suffix))
+
+
+def keep(stem: str, suffix: str, data: bytes) -> Path:
+    """Keep something in the folder, and return its file, which appears at once: no process ever sees half of it.
+
+    Parameters
+    ----------
+    stem, suffix : str
+        How its name begins and ends; what stands between is made of what it holds.
+    data : bytes
+        What it holds.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    path = folder() / _name(stem, suffix, data)
+    handle, unfinished = tempfile.mkstemp(dir=path.parent, suffix=".unfinished")  # nobody else may read or write it
+    try:
+        with open(handle, "wb") as file:
+            file.write(data)
+        os.replace(unfinished, path)
+    except BaseException:
+        _remove(Path(unfinished))
+        raise
     return path
+
+
+@functools.cache
+def warn(message: str) -> None:
+    """Say something on standard error that stops nothing, once; a program with a log of its own finds it there."""
+    _LOG.warning("note: %s", message)
+
+
+def _name(stem: str, suffix: str, data: bytes) -> str:
+    return f"{stem}-{hashlib.sha256(data).hexdigest()}{suffix}"
+
+
+def _candidates(stem: str, suffix: str) -> list[Path]:
+    try:
+        return sorted(folder().glob(f"{stem}-*{suffix}"))
+    except OSError:
+        return []
+
+
+def _own(path: Path) -> bytes | None:
+    """Return what a file holds; ``None`` where it cannot be read, or is not a file of this user's that only he can write."""
+    try:
+        found = path.lstat()
+        return path.read_bytes() if stat.S_ISREG(found.st_mode) and _is_own(found) else None
+    except OSError:
+        return None
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink()
+    except OSError:
+        return  # it stays, and is not loaded the next time either
+
+
+def _made(path: Path) -> Path:
+    """Make a folder, and those above it that are not there, for this user alone."""
+    missing = [p for p in (path, *path.parents) if not p.exists()]
+    for one in reversed(missing):
+        one.mkdir(mode=0o700, exist_ok=True)
+    return path
+
+
+def _fault(path: Path) -> str:
+    """Return why others could put something into a folder, also by putting another one in its place; empty where they cannot."""
+    if not hasattr(os, "geteuid"):  # Windows: what others may do with the user's folders is said by its lists, and is nothing
+        return ""
+    for place in (path, path.parent):
+        if place.stat().st_uid != os.geteuid():
+            return f"{place} belongs to another user"
+        if _others_write(place.stat()):
+            return f"others can write to {place}"
+    for above in path.parent.parents:
+        found = above.stat()
+        if found.st_uid not in (0, os.geteuid()):
+            return f"{above} belongs to another user"
+        if _others_write(found) and not found.st_mode & stat.S_ISVTX:  # in a sticky one, as /tmp, nobody moves what is another's
+            return f"others can write to {above}"
+    return ""
+
+
+def _is_own(found: os.stat_result) -> bool:
+    return not hasattr(os, "geteuid") or (found.st_uid == os.geteuid() and not _others_write(found))
+
+
+def _others_write(found: os.stat_result) -> bool:
+    """Tell whether others can write; a group that has this user alone, as many Linux systems make one for each, is none."""
+    if found.st_mode & stat.S_IWOTH:
+        return True
+    return bool(found.st_mode & stat.S_IWGRP) and not _is_private(found.st_gid)
+
+
+@functools.cache
+def _is_private(gid: int) -> bool:
+    import grp
+    import pwd
+
+    try:
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(gid)
+    except KeyError:
+        return False
+    return group.gr_name == user.pw_name and user.pw_gid == gid and set(group.gr_mem) <= {user.pw_name}

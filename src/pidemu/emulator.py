@@ -545,7 +545,7 @@ class Controller:
         modes = modes_of(signals)
         out = np.empty(modes.size)
         self.engine = for_record(self.program, modes.size, self._forced)
-        fast = self._running.runner(self.engine.engine)
+        fast = self._running.runner(self.engine)
         odd = (signals["hold"] > 0) | ~np.isfinite(signals["sp"]) | ~np.isfinite(signals["pv"])
         odd |= np.isinf(signals.get("cascade", signals["sp"]))
         if measured:

@@ -11,16 +11,18 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.cache import warn
 from pidemu.errors import EngineError, suggest
 from pidemu.scan.program import Program, Structure
 from pidemu.targets import python
-from pidemu.targets.runner import Block, Floats, Runner
+from pidemu.targets.runner import Block, Floats, Run, Runner
 
 Engine = Literal["python", "numpy", "numba", "c"]
 ENGINES: Final[tuple[Engine, ...]] = get_args(Engine)
@@ -30,13 +32,18 @@ _PYTHON: Final = 15e-9
 _IMPORT: Final = 0.4
 """Seconds to import Numba."""
 _COMPILE: Final = 0.7
-"""Seconds in which it compiles a structure."""
+"""Seconds in which it compiles a structure of up to a hundred assignments."""
+_LONGER: Final = 1.5
+"""With what power of their number the seconds grow beyond that."""
 _LOAD: Final = 0.05
 """Seconds to load one that was compiled."""
 _CALL: Final = 2e-4
 """Seconds to look up one that is loaded, and to call it."""
 _LOOPS_FOR_NUMPY: Final = 12
 """Loops side by side from which on NumPy is quicker than loop after loop in plain Python."""
+_ASKED: Final = "asked for"
+_BROKEN: Final[set[Engine]] = set()
+"""Engines that failed in this process: they are not chosen any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +105,12 @@ def for_record(program: Program, scans: int, forced: Engine | None = None) -> Ch
         The engine that was asked for.
     """
     if forced is not None:
-        return Choice(forced, "asked for")
+        return Choice(forced, _ASKED)
     in_python = _PYTHON * len(program.body) * scans
     if in_python < _CALL:
         return Choice("python", "too short to be worth a call into compiled code")
-    if not has_numba():
-        return Choice("python", "Numba is not installed")
+    if without := _no_numba():
+        return Choice("python", without)
     return _weighed(program.structure, in_python, blocks=False)
 
 
@@ -120,13 +127,18 @@ def for_loops(structure: Structure, scans: int, loops: int, forced: Engine | Non
         The engine that was asked for.
     """
     if forced is not None:
-        return Choice(forced, "asked for")
+        return Choice(forced, _ASKED)
     alone: Choice = Choice("numpy", "many loops") if loops >= _LOOPS_FOR_NUMPY else Choice("python", "few loops")
-    if not has_numba():
-        return Choice(alone.engine, f"{alone.reason}, and Numba is not installed")
+    if without := _no_numba():
+        return Choice(alone.engine, f"{alone.reason}, and {without}")
     in_python = _PYTHON * len(structure.body) * scans * loops
     found = _weighed(structure, in_python / (8 if alone.engine == "numpy" else 1), blocks=True)
     return found if found.engine == "numba" else Choice(alone.engine, f"{alone.reason}, {found.reason}")
+
+
+def _no_numba() -> str:
+    """Return why Numba is not chosen, whatever it would save; empty where it may be."""
+    return "Numba does not work here" if "numba" in _BROKEN else "" if has_numba() else "Numba is not installed"
 
 
 def _weighed(structure: Structure, otherwise: float, *, blocks: bool) -> Choice:
@@ -138,7 +150,7 @@ def _weighed(structure: Structure, otherwise: float, *, blocks: bool) -> Choice:
         return Choice("numba", "compiled already")
     if otherwise > begun + _LOAD and numba.is_compiled(structure, blocks=blocks):
         return Choice("numba", "compiled by an earlier run")
-    if otherwise > begun + _COMPILE:
+    if otherwise > begun + _COMPILE * max(1.0, len(structure.body) / 100) ** _LONGER:
         return Choice("numba", "long enough to be worth compiling")
     return Choice("python", "too short to be worth compiling")
 
@@ -166,6 +178,54 @@ def runner(program: Program, engine: Engine) -> Runner:
     from pidemu.targets import native
 
     return native.runner(program)
+
+
+def safe_runner(program: Program, choice: Choice) -> Runner:
+    """Return a program as functions over records; where the engine fails and nobody asked for it, plain Python goes on.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    choice : Choice
+        What runs it.
+    """
+    if choice.engine == "python" or choice.reason == _ASKED:
+        return runner(program, choice.engine)
+    try:
+        quick, plain = runner(program, choice.engine), python.runner(program)
+    except Exception as error:
+        return runner(program, instead(choice.engine, error).engine)
+
+    def safe(run: Run, otherwise: Run) -> Run:
+        def over(state: list[Any], signals: Sequence[Floats], scans: int) -> Floats:
+            try:
+                return run(state, signals, scans)  # which changes the state when all is done
+            except Exception as error:
+                instead(choice.engine, error)
+                return otherwise(state, signals, scans)
+
+        return over
+
+    return Runner(safe(quick.run, plain.run), safe(quick.run_automatic, plain.run_automatic), quick.read_in_automatic)
+
+
+def instead(engine: Engine, error: Exception) -> Choice:
+    """Return what runs something after an engine failed: plain Python, which needs nothing, and gives the same bits; say so.
+
+    Parameters
+    ----------
+    engine : {"python", "numpy", "numba", "c"}
+        What failed.
+    error : Exception
+        How.
+    """
+    if engine == "numba":  # whatever is wrong with it, such as a library it does not fit, is wrong with every program
+        _BROKEN.add(engine)
+    if engine != "python":
+        first = next(iter(str(error).splitlines()), "")
+        warn(f"the engine '{engine}' failed ({type(error).__name__}: {first[:200]}); plain Python runs what it was to run")
+    return Choice("python", f"{engine} failed")
 
 
 def block(structure: Structure, engine: Engine) -> tuple[Block, int]:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pidemu.algorithm import Algorithm
-from pidemu.engines import Engine, runner
+from pidemu.engines import Choice, safe_runner
 from pidemu.errors import ScanError
 from pidemu.scan.program import Program
 from pidemu.targets.python import Compiled, compiled
@@ -54,7 +54,7 @@ class Running:
         self._algorithm, self._built = algorithm, built
         self._places = {q.name: i for i, q in enumerate(self.program.states)}
         self._others: dict[float, Compiled] = {}
-        self._runners: dict[Engine, Runner] = {}
+        self._runners: dict[Choice, Runner] = {}
 
     def at(self, h: float) -> Compiled:
         """Return the functions for another scan interval [s].
@@ -78,11 +78,11 @@ class Running:
             found = self._others[h] = compiled(program)
         return found
 
-    def runner(self, engine: Engine) -> Runner:
+    def runner(self, choice: Choice) -> Runner:
         """Return the functions that run the program over a record."""
-        if engine not in self._runners:
-            self._runners[engine] = runner(self.program, engine)
-        return self._runners[engine]
+        if choice not in self._runners:
+            self._runners[choice] = safe_runner(self.program, choice)
+        return self._runners[choice]
 
     def reset(self) -> None:
         """Go back to before the first scan."""

@@ -183,7 +183,7 @@ def test_a_file_that_is_not_utf_8_is_refused_on_its_line(tmp_path: Path) -> None
     file.write_bytes("card: 1\nvendor: Müller\n".encode("latin-1"))
     with pytest.raises(CardError) as caught:
         parse_file(file, "shown.yaml")
-    assert [p.headline() for p in caught.value.problems] == ["shown.yaml:2:1: not UTF-8 text; save the file as UTF-8"]
+    assert [p.headline() for p in caught.value.problems] == ["shown.yaml:2:10: not UTF-8 text (byte 0xFC); save the file as UTF-8"]
 
 
 def test_a_byte_order_mark_is_no_part_of_the_card(tmp_path: Path) -> None:

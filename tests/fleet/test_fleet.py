@@ -8,6 +8,7 @@ import math
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,15 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
-from pidemu.engines import Engine
+from pidemu.cache import warn
+from pidemu.engines import Engine, block
 from pidemu.fleet import blocks, local, prepare
 from pidemu.fleet.blocks import COLUMNS
 from pidemu.fleet.judgement import RAN
 from pidemu.fleet.loops import Plan
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import HEADER
+from pidemu.scan.program import Structure
 from tests.fleet.support import EVERY_ENGINE, alike, alone, check_figures, check_signals, few, mixed, same
 
 STEPS: dict[str, Any] = {"setpoint": (5.0, 6.0), "load": (31.0, -20.0), "time": 60.0}
@@ -282,14 +285,74 @@ def test_signals_that_were_not_kept_and_loops_that_are_not_there_are_named() -> 
         result["l1"]
 
 
-def test_an_error_of_an_engine_ends_the_run_and_its_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*args: Any) -> None:
-        raise pidemu.EngineError("the compiler is broken; mend it")
+def breaks(*args: Any) -> None:
+    raise IndexError("out of the engine")
 
-    monkeypatch.setattr(local, "block", lambda structure, engine: (broken, 8))
-    with pytest.raises(pidemu.EngineError, match="the compiler is broken; mend it"):
-        Fleet(alike(40)).simulate(**STEPS)
+
+@pytest.mark.parametrize("engine", ["numpy", None])
+def test_loops_of_a_block_that_fails_are_run_one_by_one_in_python_and_it_is_said_once(
+    engine: Engine | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    warn.cache_clear()
+    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    expected = Fleet(alike(40)).simulate(**STEPS, keep=True, engine="python")
+    monkeypatch.setattr(local, "block", lambda structure, engine: (breaks, 8))
+    result = Fleet(alike(40)).simulate(**STEPS, keep=True, engine=engine)
+    assert result.counts == {"done": 40}
+    assert set(result.engines) == {"python"}
+    assert same(result, expected, [loop.tag for loop in result.loops])
+    assert all(np.array_equal(result[t].output, expected[t].output) for t in ("L0", "L17", "L39"))
+    assert caplog.messages == [
+        "note: the engine 'numpy' failed (IndexError: out of the engine); plain Python runs what it was to run"
+    ]
     assert not any(t.name.startswith("fleet") for t in threading.enumerate())
+
+
+@pytest.mark.parametrize("error", [RecursionError("too deep"), MemoryError(), KeyError("kp"), pidemu.EngineError("no compiler")])
+def test_an_engine_that_cannot_begin_is_replaced_by_plain_python(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(structure: Structure, engine: Engine) -> Any:
+        if engine != "python":
+            raise error
+        return block(structure, engine)
+
+    monkeypatch.setattr(local, "block", broken)
+    result = Fleet(alike(20)).simulate(**STEPS, engine="numpy")
+    assert result.counts == {"done": 20}
+    assert set(result.engines) == {"python"}
+
+
+@pytest.mark.parametrize("error", [RecursionError("too deep"), MemoryError("no room"), KeyError("kp"), SyntaxError("a113")])
+def test_a_loop_that_fails_in_running_costs_itself_only(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = blocks.run_block
+
+    def run_block(members: Sequence[prepare.Prepared], *rest: Any) -> Any:
+        if any(m.tag == "L7" for m in members):
+            raise error
+        return real(members, *rest)
+
+    monkeypatch.setattr(local, "run_block", run_block)
+    for engine in ("python", "numpy", None):
+        result = Fleet(alike(20)).simulate(**STEPS, engine=engine)
+        assert result.counts == {"done": 19, "failed": 1}
+        assert result.failures == {
+            "L7": f"internal error of this loop ({type(error).__name__}: {error}); give the loop what pidemu.Loop documents, "
+            f"and report it where that is done"
+        }
+
+
+@pytest.mark.parametrize("error", [RecursionError("too deep"), MemoryError("no room"), KeyError("kp"), SyntaxError("a113")])
+def test_a_loop_that_fails_in_preparing_costs_itself_only(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = Plan.trial
+
+    def trial(self: Plan, loop: Loop) -> Any:
+        if loop.tag == "L7":
+            raise error
+        return real(self, loop)
+
+    monkeypatch.setattr(Plan, "trial", trial)
+    result = Fleet(alike(20)).simulate(**STEPS)
+    assert result.counts == {"done": 19, "failed": 1}
+    assert f"internal error of this loop ({type(error).__name__}: {error})" in result.failures["L7"]
 
 
 def test_what_is_in_memory_does_not_grow_with_blocks_that_nobody_has_taken(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,11 +72,18 @@ def test_signal_ranges_stand_among_the_settings(tmp_path: Path) -> None:
 
 
 def test_lines_are_counted_as_an_editor_counts_them(tmp_path: Path) -> None:
-    text = "\ufeff# a plant\r\n\r\n" + HEAD + "\r\n" + GOOD + "\r\n,,,,,,,,,\r\n# out of service\r\nLIC-2,no/card,,gain=1,,,,,,\r\n"
+    text = "\ufeff# a plant\r\n\r\n" + HEAD + "\r\n" + GOOD + "\r\n,,,,,,,,,\r\nLIC-2,no/card,,gain=1,,,,,,\r\n"
     (tmp_path / "loops.csv").write_bytes(text.encode())
     table = read_loops(tmp_path / "loops.csv")
     assert table.lines == (4,)
-    assert [(w.line, w.tag, w.card) for w in table.wrong] == [(7, "LIC-2", "no/card")]
+    assert [(w.line, w.tag, w.card) for w in table.wrong] == [(6, "LIC-2", "no/card")]
+    assert table.skipped == "skipped: 1 comment line above the header and 2 empty lines"
+
+
+def test_a_tag_may_begin_with_a_number_sign(tmp_path: Path) -> None:
+    table = read(tmp_path, GOOD.replace("FIC-1", "#1 boiler"), GOOD.replace("FIC-1", "# 2"))
+    assert [loop.tag for loop in table.loops] == ["#1 boiler", "# 2"]
+    assert table.skipped == ""
 
 
 WRONG = {
@@ -124,7 +131,11 @@ WRONG = {
     'A,generic/standard,"K=2': ("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
 }
 
-WRONG["A" * 200_000] = "not a row of a CSV file (field larger than field limit (131072)); save the table as CSV text"
+WRONG["A" * 200_000] = "a cell has more than 131,072 characters; shorten it"
+WRONG["# FIC-2 is out of service"] = "1 cells, the header has 10; comments stand above the header"
+WRONG["#REF!,generic/standard,K=2; Ti=10,,,,,,,"] = "no process; every loop needs one"
+WRONG["A\x00,generic/standard,K=2; Ti=10,gain=1,,,,,,"] = "column 2: U+0000, NUL, stands in the text; remove it"
+WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,,,\u2028B,,"] = "column 43: U+2028, a line separator, stands in the text; remove it"
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))
@@ -168,12 +179,29 @@ def test_a_file_without_loops_or_that_is_no_text_is_refused(tmp_path: Path) -> N
     with pytest.raises(FleetError, match="no loops; the file has a header line such as tag,card,settings,process and one"):
         read(tmp_path)
     path.write_bytes("tag,card,settings,process\nKühler,a/b,,gain=1\n".encode("latin-1"))
-    with pytest.raises(FleetError, match="not UTF-8 text; save the file as UTF-8"):
+    with pytest.raises(FleetError, match=r":2:2: not UTF-8 text \(byte 0xFC\); save the file as UTF-8"):
         read_loops(path)
     with pytest.raises(FleetError, match="cannot be read: No such file or directory"):
         read_loops(tmp_path / "none.csv")
     with pytest.raises(CardNotFoundError, match="no folder 'nowhere'"):
         read_loops(path, vendors=["nowhere"])
+
+
+def test_a_tag_that_a_spreadsheet_would_compute_is_written_as_text_and_read_as_it_was(tmp_path: Path) -> None:
+    tags = ["=1+1", "-101-FIC", "+a", "@b", "'=c", "FIC-1"]
+    table = read(tmp_path, *(GOOD.replace("FIC-1", tag) for tag in tags))
+    assert [loop.tag for loop in table.loops] == ["=1+1", "-101-FIC", "+a", "@b", "=c", "FIC-1"]
+    table.write(tmp_path / "out.csv", pidemu.Fleet(table.loops).simulate(engine="python"))
+    with (tmp_path / "out.csv").open(encoding="utf-8", newline="") as file:
+        assert [row["tag"] for row in csv.DictReader(file)] == ["'=1+1", "'-101-FIC", "'+a", "'@b", "'=c", "FIC-1"]
+
+
+def test_the_table_is_not_written_onto_the_file_of_loops(tmp_path: Path) -> None:
+    table = read(tmp_path, GOOD)
+    before = (tmp_path / "loops.csv").read_bytes()
+    with pytest.raises(FleetError, match=r"loops\.csv: is read, too, as .*; give another file for the result"):
+        table.write(tmp_path / "loops.csv", pidemu.Fleet(table.loops).simulate(engine="python"))
+    assert (tmp_path / "loops.csv").read_bytes() == before
 
 
 def test_the_written_table_has_every_row_of_the_file_in_its_order(tmp_path: Path) -> None:

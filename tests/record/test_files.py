@@ -12,6 +12,7 @@ from pidemu.errors import RecordError
 from pidemu.record.files import Record, read_record, write_record
 
 NAN = float("nan")
+ONLY = "is not a number; write digits and a decimal point only, such as 10 or 1.5e-3"
 
 
 def read(folder: Path, text: str) -> Record:
@@ -93,6 +94,20 @@ def test_without_a_column_the_recorded_output_is_the_operator_s(tmp_path: Path) 
         ("sp,pv\n1,2\n1,\n", ":3: column pv: empty; every sample needs a number"),
         ("sp,pv\n,2\n", ":2: column sp: empty; every sample needs a number"),
         ("sp,pv\nbad,2\n", ":2: column sp: 'bad' is not a number"),
+        ("sp,pv\n1,2\n#REF!,2\n", ":3: column sp: '#REF!' is not a number"),
+        ("sp,pv\n1,2\n# 1,2\n", ":3: column sp: '# 1' is not a number"),
+        ("sp,pv\n1,2\n# out of service\n", ":3: 1 cells, the header has 2; comments stand above the header"),
+        ("sp,pv\n1,1_0\n", f":2: column pv: '1_0' {ONLY}"),
+        ("sp,pv\n1,٣\n", f":2: column pv: '٣' {ONLY}"),
+        ("sp,pv\n1,0x10\n", ":2: column pv: '0x10' is not a number"),
+        ("sp,pv\n1,1e999\n", ":2: column pv: '1e999' is too large a number"),
+        ("t,sp,pv\n1_0,1,2\n", ":2: column t: '1_0' is neither a number of seconds nor a timestamp such as 2026-11-22T08:00:05"),
+        ("sp,pv\n1,2\x0b1,2\n", ":2:4: U+000B, a vertical tab, stands in the text; remove it"),
+        ("sp,pv\n1,2\u20281,2\n", ":2:4: U+2028, a line separator, stands in the text; remove it"),
+        ("\ufeff\ufeffsp,pv\n1,2\n", ":1:1: U+FEFF, a byte order mark that is not the first, stands in the text; remove it"),
+        ("sp,pv\n1," + "2" * 131_073, ":2: a cell has more than 131,072 characters; shorten it"),
+        ("sp,pv\n1," + "x" * 1000, f":2: column pv: '{40 * 'x'}…{20 * 'x'}' is not a number"),
+        ('sp,pv,note\n1,2,"a\nb"\n', ":2: a quotation mark is not closed; a row is one line, and a mark within a cell is doubled"),
         ("sp,pv,FF\n1,2,inf\n", ":2: column FF: 'inf' is not a finite number; leave the cell empty where there is no signal"),
         ("sp,pv,cas\n1,2,on\n", ":2: column cas: 'on' is not a number"),
         ("sp,pv,hold\n1,2,maybe\n", ":2: column hold: 'maybe' is neither 1 (hold) nor 0 (no hold)"),
@@ -113,6 +128,27 @@ def test_a_cell_that_cannot_be_used_is_refused_at_its_place(tmp_path: Path, text
     with pytest.raises(RecordError) as caught:
         read(tmp_path, text)
     assert str(caught.value) == f"{tmp_path / 'record.csv'}{message}"
+
+
+def test_comments_above_the_header_are_counted_and_kept(tmp_path: Path) -> None:
+    record = read(tmp_path, "\ufeff# TIC-101, Kühler\n#\n\nsp,pv\n1,2\n\n3,4\n")
+    assert record.comments == ("# TIC-101, Kühler", "#")
+    assert record.skipped == "skipped: 2 comment lines above the header and 2 empty lines"
+    stream = io.StringIO()
+    write_record(record, {"x": [5, 6]}, stream)
+    assert stream.getvalue() == "# TIC-101, Kühler\n#\nsp,pv,x\n1,2,5.0\n3,4,6.0\n"
+    assert read(tmp_path, stream.getvalue()).comments == record.comments
+
+
+def test_text_that_a_spreadsheet_would_compute_is_written_as_text_and_numbers_as_numbers(tmp_path: Path) -> None:
+    record = read(tmp_path, "sp,pv,note,+x\n-1.5,-inf,=1+1,@a\n+2,nan,'=b,-\n")
+    assert record.header == ("sp", "pv", "note", "+x")
+    assert record.rows == (("-1.5", "-inf", "=1+1", "@a"), ("+2", "nan", "=b", "-"))
+    stream = io.StringIO()
+    write_record(record, {"-y": [-0.5, -float("inf")]}, stream)
+    assert stream.getvalue() == "sp,pv,note,'+x,'-y\n-1.5,-inf,'=1+1,'@a,-0.5\n+2,nan,'=b,'-,-inf\n"
+    again = read(tmp_path, stream.getvalue())
+    assert [row[:4] for row in again.rows] == list(record.rows)
 
 
 def test_new_columns_are_written_behind_the_cells_as_they_stand(tmp_path: Path) -> None:

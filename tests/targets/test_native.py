@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -94,7 +95,7 @@ def test_loops_that_differ_in_numbers_and_dead_times_share_what_is_compiled(fold
     x = np.random.default_rng(1).normal(0, 1, 60)
     for program in (delaying((7, 3)), delaying((1, 20)), replace(delaying((2, 2)), values=(0.3,), initial=(0.0,), title="other")):
         check(program, [x], (0, 60))
-    assert sorted(path.suffix for path in folder.iterdir()) == [".c", ".so"]
+    assert [path.suffix for path in folder.iterdir()] == [".so"]
 
 
 @needs_compiler
@@ -115,7 +116,7 @@ def test_processes_that_compile_the_same_at_once_do_not_meet(folder: Path) -> No
     environment = {**os.environ, "PIDEMU_CACHE": str(folder.parent)}
     both = [subprocess.Popen([sys.executable, "-c", text], env=environment) for _ in range(2)]
     assert [process.wait() for process in both] == [0, 0]
-    assert sorted(path.suffix for path in folder.iterdir()) == [".c", ".so"]
+    assert [path.suffix for path in folder.iterdir()] == [".so"]
 
 
 @needs_compiler
@@ -165,4 +166,42 @@ def test_what_a_compiler_says_is_told_and_nothing_is_left(folder: Path, monkeypa
     monkeypatch.setenv("CC", str(stand_in))
     with pytest.raises(EngineError, match="mycc' does not compile a scan program: mycc: no licence; name another one in CC"):
         native.runner(delaying((1, 1)))
-    assert [path.suffix for path in folder.iterdir()] == [".c"]
+    assert list(folder.iterdir()) == []
+
+
+@needs_compiler
+@pytest.mark.parametrize("damage", ["emptied", "cut short", "a bit turned"])
+def test_a_damaged_library_is_compiled_again_and_never_loaded(damage: str, folder: Path) -> None:
+    native.runner(delaying((1, 1)))
+    (path,) = folder.iterdir()
+    sound = path.read_bytes()
+    middle = len(sound) // 2
+    turned = sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :]
+    path.unlink()  # a library that is loaded is not written to
+    path.write_bytes({"emptied": b"", "cut short": sound[:middle], "a bit turned": turned}[damage])
+    native._compiled.cache_clear()
+    check(delaying((1, 1)), [np.ones(9)], (0, 9))
+    (again,) = folder.iterdir()
+    assert again.read_bytes() == sound
+
+
+@needs_compiler
+def test_a_full_disk_is_an_error_with_the_remedy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*args: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(native, "keep", full)
+    message = "the engine 'c' cannot write what it compiles: No space left on device; name another folder in PIDEMU_CACHE"
+    with pytest.raises(EngineError, match=message):
+        native.runner(delaying((1, 1)))
+    assert list(folder.iterdir()) == []
+
+
+@needs_compiler
+def test_a_library_that_the_system_does_not_load_is_an_error_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(path: str) -> None:
+        raise OSError(f"{path}: failed to map segment from shared object")
+
+    monkeypatch.setattr("ctypes.CDLL", refused)
+    with pytest.raises(EngineError, match=r"cannot load what it compiled: .*failed to map segment.*; name another folder in"):
+        native.runner(delaying((1, 1)))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu import Process
+from pidemu import Process, cache
 from pidemu.checks.runs import plausible
 from pidemu.fleet.prepare import measured
 from pidemu.loop.trial import trial
@@ -29,6 +29,7 @@ OTHER_PROCESS = """
 import json
 import numpy as np
 import pidemu
+from pidemu import cache
 from pidemu.targets import numba
 
 s = pidemu.load_card("generic/standard").settings(K=1.5, Ti=10, Td=0)
@@ -36,7 +37,7 @@ c = pidemu.Controller(s, 0.5, engine="numba")
 out = c.run(50 + np.arange(200) % 7, np.full(200, 49.0))
 module, _ = numba._record_module(c.program.structure)
 stats = module.run_automatic.stats
-print(json.dumps([sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), out.tolist(), module.__file__]))
+print(json.dumps([sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), out.tolist(), str(cache.folder())]))
 """
 
 
@@ -79,7 +80,8 @@ def test_two_processes_that_compile_at_once_do_not_disturb_each_other(tmp_path: 
     found = [said(process) for process in both]
     assert found[0][2] == found[1][2] == expected()
     assert said(started(tmp_path))[:2] == (1, 0)
-    assert list((tmp_path / pidemu.__version__).glob("tmp*")) == []  # half-written files do not stay
+    files = list((tmp_path / pidemu.__version__).iterdir())
+    assert {path.suffix for path in files} == {".numba"}  # half-written files do not stay
 
 
 @pytest.mark.parametrize("folder", ["/dev/null/pidemu", "~nobody-of-that-name/pidemu"])
@@ -138,7 +140,7 @@ def test_what_is_compiled_and_loaded_is_known(no_code_yet: Path) -> None:
     assert target.is_loaded(structure, blocks=True)
     assert target.is_compiled(structure, blocks=True)
     assert (target.is_compiled(structure), target.is_loaded(structure)) == (False, False)  # one loop is another function
-    assert [path.suffix for path in (no_code_yet / pidemu.__version__).glob("scan_*.py")] == [".py", ".py"]
+    assert [path.suffix for path in (no_code_yet / pidemu.__version__).iterdir()] == [".numba"]
 
 
 def test_programs_that_differ_in_numbers_share_what_is_compiled(no_code_yet: Path) -> None:
@@ -148,4 +150,53 @@ def test_programs_that_differ_in_numbers_share_what_is_compiled(no_code_yet: Pat
         controller.run(50.0, np.full(100, 49.0))
     module, _ = target._record_module(controller.program.structure)
     assert len(module.run_automatic.signatures) == 1
-    assert len(list((no_code_yet / pidemu.__version__).glob("scan_*.py"))) == 1
+    assert len(list((no_code_yet / pidemu.__version__).iterdir())) == 1
+
+
+BAIT = """
+import os, pickle, sys
+class Bait:
+    def __reduce__(self):
+        return os.system, (f"echo unpickled > {sys.argv[1]}",)
+sys.stdout.buffer.write(pickle.dumps(Bait()))
+"""
+
+
+@pytest.mark.parametrize("damage", ["emptied", "cut short", "a bit turned", "a pickle that runs something"])
+def test_a_damaged_or_foreign_file_is_never_unpickled_and_is_compiled_anew(damage: str, tmp_path: Path) -> None:
+    code, bait = tmp_path / "code", tmp_path / "bait"
+    first = said(started(code))
+    (path,) = (code / pidemu.__version__).iterdir()
+    sound = path.read_bytes()
+    middle = len(sound) // 2
+    turned = sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :]
+    foreign = subprocess.run([sys.executable, "-c", BAIT, str(bait)], capture_output=True, check=True).stdout
+    damaged = {"emptied": b"", "cut short": sound[:middle], "a bit turned": turned, "a pickle that runs something": foreign}
+    path.write_bytes(damaged[damage])
+    second = said(started(code))
+    assert (second[:2], second[2]) == ((0, 1), first[2])
+    assert not bait.exists()
+    assert said(started(code))[:2] == (1, 0)
+
+
+def test_what_fits_another_version_of_numba_is_compiled_anew(no_code_yet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = pidemu.load_card("generic/standard").settings(K=1.5, Ti=10, Td=0)
+    pidemu.Controller(settings, 0.5, engine="numba").run(50.0, np.full(100, 49.0))
+    (path,) = (no_code_yet / pidemu.__version__).iterdir()
+    stem = path.name.partition("-")[0]
+    path.unlink()
+    cache.keep(stem, ".numba", b"sound, and no pickle that this Numba knows")
+    target._record_module.cache_clear()
+    found = pidemu.Controller(settings, 0.5, engine="numba").run(50.0, np.full(100, 49.0))
+    assert found.tolist() == pidemu.Controller(settings, 0.5, engine="python").run(50.0, np.full(100, 49.0)).tolist()
+
+
+def test_a_disk_without_room_costs_nothing_but_the_next_compilation(no_code_yet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*args: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pidemu.targets.numba_store.keep", full)
+    settings = pidemu.load_card("generic/standard").settings(K=1.5, Ti=10, Td=0)
+    found = pidemu.Controller(settings, 0.5, engine="numba").run(50.0, np.full(100, 49.0))
+    assert found.tolist() == pidemu.Controller(settings, 0.5, engine="python").run(50.0, np.full(100, 49.0)).tolist()
+    assert list((no_code_yet / pidemu.__version__).iterdir()) == []

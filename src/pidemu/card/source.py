@@ -16,12 +16,15 @@ from typing import Any, Final
 import yaml
 
 from pidemu.errors import CardError, Problem
+from pidemu.excerpt import visible
+from pidemu.files.reading import Kind, read_text
 
 Path_ = tuple[str | int, ...]
 """Keys and indices that lead to a value."""
 
 _Loader: Final[Any] = getattr(yaml, "CLoader", yaml.Loader)
 _MAX_DEPTH: Final = 32
+CARD: Final = Kind("a card", "a card starts with 'card: 1'", limit=2**22, pipes=False)
 
 _INT: Final = re.compile(r"[-+]?[0-9]+$")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
@@ -93,8 +96,9 @@ def _scalar(text: str, plain: bool) -> Any:
 class _Reader:
     """Builds the document from parser events, without recursion into the C parser's own composer."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, kind: Kind) -> None:
         self.document = document
+        self.kind = kind.name.removeprefix("a ")
         self.problems: list[Problem] = []
         self.events: Any = None
 
@@ -114,9 +118,9 @@ class _Reader:
         self.document.values[path] = self.place(event)
         tag = getattr(event, "tag", None)
         if tag not in (None, "!"):
-            self.fail(event.start_mark, f"tag '{tag}' is not used in cards; remove it")
+            self.fail(event.start_mark, f"tag '{tag}' is not used in {self.kind}s; remove it")
         if isinstance(event, yaml.AliasEvent):
-            self.fail(event.start_mark, f"alias '*{event.anchor}' is not used in cards; write the value out")
+            self.fail(event.start_mark, f"alias '*{event.anchor}' is not used in {self.kind}s; write the value out")
             return None
         if isinstance(event, yaml.ScalarEvent):
             return _scalar(event.value, event.implicit[0])
@@ -150,7 +154,7 @@ class _Reader:
         return mapping
 
 
-def parse(text: str, path: str) -> Document:
+def parse(text: str, path: str, kind: Kind = CARD) -> Document:
     """Read one YAML document.
 
     Parameters
@@ -159,6 +163,8 @@ def parse(text: str, path: str) -> Document:
         The file's text.
     path : str
         The file's name, for messages.
+    kind : Kind
+        What the text should be.
 
     Returns
     -------
@@ -172,7 +178,7 @@ def parse(text: str, path: str) -> Document:
     """
     digest = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
     document = Document(path, tuple(text.splitlines()), digest=digest)
-    reader = _Reader(document)
+    reader = _Reader(document, kind)
     try:
         reader.events = iter(yaml.parse(text, Loader=_Loader))
         roots = 0
@@ -180,7 +186,7 @@ def parse(text: str, path: str) -> Document:
             if isinstance(event, yaml.NodeEvent):
                 roots += 1
                 if roots > 1:
-                    reader.fail(event.start_mark, "a second document; a card is one document, put it in a file of its own")
+                    reader.fail(event.start_mark, f"a second document; {kind.name} is one document, put it in a file of its own")
                     break
                 document.value = reader.read(event, ())
     except yaml.MarkedYAMLError as error:
@@ -202,14 +208,14 @@ def parse(text: str, path: str) -> Document:
         line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
         reader.problems.append(Problem(path, line, column, "half a Unicode pair; remove it", 1, document.lines))
     if not reader.problems and not isinstance(document.value, dict):
-        kind = "empty" if document.value is None else "not a mapping"
-        reader.problems.append(Problem(path, 1, 1, f"the file is {kind}; a card starts with 'card: 1'", 1, document.lines))
+        what = "empty" if document.value is None else "not a mapping"
+        reader.problems.append(Problem(path, 1, 1, f"the file is {what}; {kind.remedy}", 1, document.lines))
     if reader.problems:
         raise CardError(sorted(reader.problems))
     return document
 
 
-def parse_file(file: Path, shown: str | None = None) -> Document:
+def parse_file(file: Path, shown: str | None = None, kind: Kind = CARD) -> Document:
     """Read one YAML file.
 
     Parameters
@@ -218,17 +224,13 @@ def parse_file(file: Path, shown: str | None = None) -> Document:
         The file.
     shown : str, optional
         Its name in messages; by default `file` itself.
+    kind : Kind
+        What the file should be.
 
     Raises
     ------
     CardError
         It cannot be read, is not UTF-8, or is wrong (see `parse`).
     """
-    name = shown or str(file)
-    try:
-        return parse(file.read_text(encoding="utf-8-sig"), name)
-    except UnicodeDecodeError as error:
-        line = file.read_bytes()[: error.start].count(b"\n") + 1
-        raise CardError([Problem(name, line, 1, "not UTF-8 text; save the file as UTF-8")]) from None
-    except OSError as error:
-        raise CardError([Problem(name, 1, 1, f"cannot be read: {error.strerror}")]) from None
+    name = visible(shown or str(file))
+    return parse(read_text(file, CardError, kind, shown=name), name, kind)

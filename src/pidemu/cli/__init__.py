@@ -8,7 +8,9 @@ from typing import Final
 
 import click
 
+from pidemu.cli import streams
 from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError, suggest
+from pidemu.files.quoting import printable
 
 _COMMANDS: Final = {
     "cards": "List the cards, and how sure they are.",
@@ -75,25 +77,35 @@ def main(arguments: list[str] | None = None) -> None:
     arguments : list of str, optional
         What follows ``pidemu``; by default what was typed.
     """
-    for stream in (sys.stdout, sys.stderr):  # a console that lacks a character shows its escape
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+    streams.prepare()
     try:
-        status = cli.main(arguments, prog_name="pidemu", standalone_mode=False)
-    except click.exceptions.Abort:
-        status = 130
-    except click.ClickException as error:
-        error.show()
-        status = error.exit_code
-    except Exception as error:
-        status = _report(error)
+        status = _status(arguments)
+        streams.flush()
+    except OSError as error:
+        status = streams.report(error)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _status(arguments: list[str] | None) -> object:
+    """Run the command line and return its exit status."""
+    try:
+        return cli.main(arguments, prog_name="pidemu", standalone_mode=False)
+    except SystemExit as end:
+        return end.code
+    except click.exceptions.Abort:
+        return 130
+    except click.ClickException as error:
+        error.message = printable(error.message)
+        error.show()
+        return error.exit_code
+    except Exception as error:
+        return _report(error)
 
 
 def _report(error: Exception) -> int:
     """Print an error of ours and return the exit status; pass on what is none of ours."""
     if not isinstance(error, PidemuError):
         raise error
-    click.echo(f"error: {error}", err=True)
+    click.echo(printable(f"error: {error}"), err=True)
     failed = isinstance(error, ConversionRefusedError | CardError) and not isinstance(error, CardNotFoundError)
     return 1 if failed else 2

@@ -9,7 +9,7 @@ import click
 from pidemu.card.base import Status
 from pidemu.card.library import card_files
 from pidemu.card.load import Card, load_file
-from pidemu.cli.common import json_option, print_json, table, vendors_option
+from pidemu.cli.common import echo, json_option, print_json, table, vendors_option
 from pidemu.errors import CardError
 
 
@@ -44,7 +44,7 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
             right=(2, 3, 4, 5),
         )
     for message in broken:
-        click.echo(f"error: {message}", err=True)
+        echo(f"error: {message}", err=True)
     if broken:
         raise SystemExit(1)
 

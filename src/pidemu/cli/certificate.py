@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
 from pidemu.card.load import Card
 from pidemu.certificate.figures import (
     BAND_COLUMNS,
@@ -18,7 +16,7 @@ from pidemu.certificate.figures import (
     unit_of,
 )
 from pidemu.certificate.models import EXACT, LoopComparison
-from pidemu.cli.common import heading, number, print_json, table, wrapped
+from pidemu.cli.common import echo, heading, number, print_json, table, wrapped
 from pidemu.conversion.document import refusal_document
 from pidemu.conversion.explain import explained
 from pidemu.conversion.result import Conversion
@@ -48,20 +46,20 @@ def print_refusal(error: ConversionRefusedError, source: Settings, goal: Card, a
     nearest = error.nearest
     if as_json:
         print_json(refusal_document(error, {"from": source.to_dict(), "to": {"card": goal.id}}))
-    click.echo(f"error: refused: {error}", err=True)
+    echo(f"error: refused: {error}", err=True)
     if as_json:
         return
     for text in error.alternatives:
-        click.echo(f"instead: {text}", err=True)
+        echo(f"instead: {text}", err=True)
     if nearest is None:
         return
     band = nearest.certificate.feedback.loop_band
-    click.echo("nearest settings, which 'pidemu convert --allow-approximate' gives:", err=True)
+    echo("nearest settings, which 'pidemu convert --allow-approximate' gives:", err=True)
     for name, value in nearest.settings.items():
         if value.active:
-            click.echo(f"  {name} = {number(value.value)} {unit_of(value)}".rstrip(), err=True)
+            echo(f"  {name} = {number(value.value)} {unit_of(value)}".rstrip(), err=True)
     cost = f"up to {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)}" if band.max_deviation >= EXACT else "none"
-    click.echo(f"their cost in the loop band: {cost}", err=True)
+    echo(f"their cost in the loop band: {cost}", err=True)
 
 
 def print_conversion(c: Conversion) -> None:
@@ -89,7 +87,7 @@ def print_plan(plan: TransferPlan) -> None:
     wrapped(f"for {plan.action_text}", "  ")
     for i, step in enumerate(plan.steps, 1):
         wrapped(step.do, f"  {i}. ")
-    click.echo(f"  {bump_line(plan)}")
+    echo(f"  {bump_line(plan)}")
     for note in plan.notes:
         wrapped(note, "  - ")
 

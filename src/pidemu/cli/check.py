@@ -8,7 +8,7 @@ import click
 
 from pidemu.card.library import card_files
 from pidemu.checks import check_file
-from pidemu.cli.common import json_option, print_json, vendors_option
+from pidemu.cli.common import echo, json_option, print_json, vendors_option
 from pidemu.errors import CardNotFoundError, Problem
 
 
@@ -29,9 +29,9 @@ def command(paths: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> 
         print_json([{"path": p.path, "line": p.line, "column": p.column, "message": p.message} for p in problems])
     else:
         for problem in problems:
-            click.echo(problem.render(), err=True)
+            echo(problem.render(), err=True)
         count = len(problems)
-        click.echo(f"{len(files)} card{'' if len(files) == 1 else 's'}, {count} problem{'' if count == 1 else 's'}")
+        echo(f"{len(files)} card{'' if len(files) == 1 else 's'}, {count} problem{'' if count == 1 else 's'}")
     if problems:
         raise SystemExit(1)
 

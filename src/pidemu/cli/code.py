@@ -9,9 +9,12 @@ from pathlib import Path
 import click
 
 from pidemu.card.library import load_card
-from pidemu.cli.common import action_option, assignments, limits_option, vendors_option
+from pidemu.cli.common import action_option, assignments, echo, limits_option, vendors_option
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
+from pidemu.excerpt import visible
+from pidemu.files.reading import reason
+from pidemu.files.writing import beside
 from pidemu.scan.program import Program
 from pidemu.settings import Settings
 from pidemu.unverified import facts, unverified_program
@@ -95,7 +98,8 @@ def _files(program: Program, lang: str, name: str, notes: Sequence[str]) -> dict
 def _write(path: Path, text: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise PidemuError(f"{path}: cannot be written: {error.strerror}") from None
-    click.echo(path)
+    except (OSError, ValueError) as error:
+        raise PidemuError(f"{visible(str(path))}: cannot be written: {reason(error)}") from None
+    with beside(path, PidemuError) as stream:
+        stream.write(text)
+    echo(str(path))

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import shutil
 import sys
 import textwrap
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.engines import ENGINES, Engine
-from pidemu.errors import RecordError, SettingError
+from pidemu.errors import SettingError
+from pidemu.excerpt import visible
+from pidemu.files.quoting import printable, printable_json
 from pidemu.plain import json_safe
 from pidemu.ranges import SignalRange, read_range
 from pidemu.words import assignments as assignments  # noqa: PLC0414
@@ -165,29 +165,18 @@ def split_options(card: Card, given: Mapping[str, object]) -> tuple[dict[str, ob
     return chosen, {k: v for k, v in given.items() if k not in chosen}
 
 
+def echo(text: str = "", *, err: bool = False) -> None:
+    """Print lines in which nothing but what is printed here controls the terminal."""
+    click.echo(printable(text), err=err)
+
+
 def heading(text: str) -> None:
     """Print a heading: bold for people, plain when piped."""
-    click.secho(text, bold=True)
+    click.secho(printable(text), bold=True)
 
 
 def _width(text: str) -> int:
     return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
-
-
-@contextlib.contextmanager
-def opened(path: str) -> Iterator[TextIO]:
-    """Open a text file to write a result.
-
-    Raises
-    ------
-    RecordError
-        It cannot be written.
-    """
-    try:
-        with Path(path).open("w", encoding="utf-8", newline="") as stream:
-            yield stream
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 def table(
@@ -208,6 +197,7 @@ def table(
     err : bool
         Print on stderr.
     """
+    rows = [[visible(cell) for cell in row] for row in rows]
     if (sys.stderr if err else sys.stdout).isatty():
         _rich(columns, rows, indent, right, err)
         return
@@ -225,7 +215,7 @@ def wrapped(text: str, indent: str = "  ") -> None:
     """Print a paragraph, within the terminal's width; 110 columns when piped."""
     width = min(110, shutil.get_terminal_size().columns) if sys.stdout.isatty() else 110
     rest = " " * len(indent)
-    click.echo(textwrap.fill(text, width, initial_indent=indent, subsequent_indent=rest, break_long_words=False))
+    echo(textwrap.fill(text, width, initial_indent=indent, subsequent_indent=rest, break_long_words=False))
 
 
 def _rich(columns: Sequence[str], rows: Sequence[Sequence[str]], indent: int, right: Sequence[int], err: bool) -> None:
@@ -248,4 +238,4 @@ def _style(cell: str) -> str:
 
 def print_json(value: Any) -> None:
     """Print plain values as JSON, with words for what is infinite."""
-    click.echo(json.dumps(json_safe(value), indent=2, ensure_ascii=False, allow_nan=False, default=str))
+    click.echo(printable_json(json.dumps(json_safe(value), indent=2, ensure_ascii=False, allow_nan=False, default=str)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -12,6 +12,7 @@ from pidemu.card.library import load_card
 from pidemu.cli.common import (
     action_option,
     assignments,
+    echo,
     heading,
     json_option,
     limits_option,
@@ -24,6 +25,7 @@ from pidemu.cli.happened import moved
 from pidemu.comparison.compare import Comparison, compare
 from pidemu.comparison.side_by_side import dials
 from pidemu.errors import RecordError
+from pidemu.files.writing import beside, check
 from pidemu.record.files import SIGNALS, Record, write_record
 from pidemu.record.playback import NO_BUMP
 from pidemu.record.standard import StandardRecord
@@ -92,7 +94,12 @@ def command(
         from pidemu.plots import check_picture
 
         check_picture(picture)
-    settings = [load_card(card, vendors).settings(assignments(values)) for card, values in _split(words)]
+    named = _split(words)
+    settings = [load_card(card, vendors).settings(assignments(values)) for card, values in named]
+    inputs = [*(card for card, _ in named), *([] if file is None else [file])]
+    for path in (target, picture):
+        if path is not None:  # now, and not after the work
+            check(path, RecordError, inputs)
     if scan is not None and len(scan) not in (1, len(settings)):
         raise click.UsageError(f"{len(scan)} scan intervals for {len(settings)} cards; give one for all, or one for each")
     comparison = compare(
@@ -104,13 +111,14 @@ def command(
         initial_output=initial_output,
     )
     if target is not None:
-        _write(comparison, target)
+        _write(comparison, target, inputs)
     if as_json:
         print_json(comparison.to_dict())
     else:
         _print(comparison, file)
-    for note in comparison.notes:
-        click.echo(f"note: {note}", err=True)
+    skipped = [f"{file}: {comparison.record.skipped}"] if comparison.record.skipped else []
+    for note in (*skipped, *comparison.notes):
+        echo(f"note: {note}", err=True)
     if picture is not None:
         from pidemu.plots import plot_comparison
 
@@ -181,10 +189,10 @@ def _table(columns: list[str], rows: list[list[str]]) -> None:
     """Print the first rows of a table whose columns are numbers but for the first."""
     table(columns, rows[:_ROWS], right=range(1, len(columns)))
     if len(rows) > _ROWS:
-        click.echo(f"  and {len(rows) - _ROWS} more; --json lists all")
+        echo(f"  and {len(rows) - _ROWS} more; --json lists all")
 
 
-def _write(c: Comparison, target: str) -> None:
+def _write(c: Comparison, target: str, inputs: Sequence[str]) -> None:
     """Write the record as the first card saw it, with all outputs as columns."""
     record: Record = c.record
     columns = {label: values.tolist() for label, values in c.outputs.items()}
@@ -193,8 +201,5 @@ def _write(c: Comparison, target: str) -> None:
         signals = [c.times.tolist(), *(getattr(record, n).tolist() for n in names)]
         rows = tuple(tuple("" if math.isnan(x) else f"{x!r}" for x in row) for row in zip(*signals, strict=True))
         record = Record(record.sp, record.pv, header=("time", *names), rows=rows)
-    try:
-        with Path(target).open("w", encoding="utf-8", newline="") as stream:
-            write_record(record, columns, stream)
-    except OSError as error:
-        raise RecordError(f"{target}: cannot be written: {error.strerror}") from None
+    with beside(target, RecordError, inputs) as stream:
+        write_record(record, columns, stream)

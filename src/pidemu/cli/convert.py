@@ -12,7 +12,18 @@ from click.core import ParameterSource
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
-from pidemu.cli.common import Pair, Range, Scan, assignments, json_option, overridden, print_json, split_options, vendors_option
+from pidemu.cli.common import (
+    Pair,
+    Range,
+    Scan,
+    assignments,
+    echo,
+    json_option,
+    overridden,
+    print_json,
+    split_options,
+    vendors_option,
+)
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
@@ -208,7 +219,7 @@ def command(
     else:
         _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:
-        click.echo(f"error: {not_known}", err=True)
+        echo(f"error: {not_known}", err=True)
         raise SystemExit(1)
 
 
@@ -235,7 +246,7 @@ def _print(conversion: Conversion, plan: TransferPlan | None, *, explain: bool, 
     if explain:
         print_explanation(conversion)
     if page is not None:
-        click.echo(f"\nwritten: {page}")
+        echo(f"\nwritten: {page}")
 
 
 def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None, ActionError | None]:

@@ -12,18 +12,20 @@ import click
 from pidemu.cli.common import (
     Time,
     asked_for,
+    echo,
     engine_option,
     given,
     heading,
     json_option,
     load_option,
     number,
-    opened,
     print_json,
     setpoint_option,
     table,
     vendors_option,
 )
+from pidemu.errors import FleetError
+from pidemu.files.writing import check
 from pidemu.fleet.fleet import Fleet
 from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.result import FleetResult
@@ -82,11 +84,12 @@ def command(
     if scheduler is not None and cores is not None:
         raise click.UsageError("--cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out")
     loops = read_loops(file, vendors)
+    if loops.skipped:
+        echo(f"note: {file}: {loops.skipped}", err=True)
     for wrong in loops.wrong:
-        click.echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
+        echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
     if target is not None:
-        with opened(target):  # now, and not after the work
-            pass
+        check(target, FleetError, [file])  # now, and not after the work
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(
@@ -112,10 +115,10 @@ def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
     for loop, line, reason in zip(loops.loops, loops.lines, result.reasons, strict=True):
         notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
         for message in (*notes, *([reason] if reason else [])):
-            click.echo(loops.located(line, loop.tag, message), err=True)
+            echo(loops.located(line, loop.tag, message), err=True)
     if result.interrupted:
         done = sum(result.counts[status] for status in RAN)
-        click.echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
+        echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
 
 
 def _plain(loops: LoopTable, rows: Sequence[Mapping[str, Any]], result: FleetResult | None) -> dict[str, Any]:
@@ -149,7 +152,7 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
     heading(f"{loops.path}: {_loops(len(rows))}, {said}" + (f"; {moving:,} not settled at the end" if moving else ""))
     if engines:
         used = ", ".join(f"{name} ({_loops(count)})" for name, count in _engines(rows).items())
-        click.echo(f"engine: {used or 'none, as nothing was run'}")
+        echo(f"engine: {used or 'none, as nothing was run'}")
     ran = [row for row in rows if row["status"] in RAN]
     if ran:
         heading(f"\nThe {_ROWS} loops with the largest IAE" if len(ran) > _ROWS else "\nLoops, the largest IAE first")
@@ -164,7 +167,7 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
         heading("\nFailed")
         table(["", "", ""], [[f"line {row['line']}", row["tag"], row["card"]] for row in failed[:_ROWS]])
     if len(failed) > _ROWS:
-        click.echo(f"  and {len(failed) - _ROWS:,} more; --table and --json list all")
+        echo(f"  and {len(failed) - _ROWS:,} more; --table and --json list all")
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-import click
-
-from pidemu.cli.common import number, table
+from pidemu.cli.common import echo, number, table
 from pidemu.record.playback import NO_BUMP, Playback
 from pidemu.signals import Event
 
@@ -53,10 +51,10 @@ def tell(playback: Playback) -> None:
         cells.append([scans, number(float(playback.times[first])), text, moved(bump) if " to " in text else ""])
     table(["scan", "time [s]", "what happened", "output moves by"], cells, err=True, right=(0, 1, 3))
     if len(rows) > _ROWS:
-        click.echo(f"  and {len(rows) - _ROWS} more; --json lists all", err=True)
+        echo(f"  and {len(rows) - _ROWS} more; --json lists all", err=True)
     worst = largest_bump(playback.events)
     if worst is not None:
-        click.echo(f"largest bump into automatic or cascade: {moved(worst.bump)} in scan {worst.scan} ({worst.text})", err=True)
+        echo(f"largest bump into automatic or cascade: {moved(worst.bump)} in scan {worst.scan} ({worst.text})", err=True)
 
 
 def moved(bump: float) -> str:

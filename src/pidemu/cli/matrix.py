@@ -6,13 +6,13 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Final
 
 import click
 
-from pidemu.cli.common import heading, json_option, print_json, table, vendors_option, wrapped
+from pidemu.cli.common import echo, heading, json_option, print_json, table, vendors_option, wrapped
 from pidemu.errors import PidemuError
+from pidemu.files.writing import beside, check
 from pidemu.matrix.cell import OUTCOMES, Cell
 from pidemu.matrix.matrix import Matrix, counts, matrix
 
@@ -54,12 +54,16 @@ def command(
         from pidemu.report.matrix_page import check_page
 
         check_page()
+    for path in (text, page):
+        if path is not None:  # now, and not after the work
+            check(path, PidemuError)
     with _shown_progress() as progress:
         found = matrix(
             cards or None, derivative=not plain, emulate=not laws, jobs=jobs, vendors=vendors, progress=progress
         )  # fmt: skip
     if text is not None:
-        _write(text, found.to_csv())
+        with beside(text, PidemuError) as stream:
+            stream.write(found.to_csv())
     if page is not None:
         from pidemu.report.matrix_page import write_page
 
@@ -69,9 +73,9 @@ def command(
     else:
         _print(found)
     for card, why in found.left_out.items():
-        click.echo(f"note: {card} is left out: {why}", err=True)
+        echo(f"note: {card} is left out: {why}", err=True)
     for cell in found.failed:
-        click.echo(f"error: {cell.source} to {cell.target}: {cell.sentence}", err=True)
+        echo(f"error: {cell.source} to {cell.target}: {cell.sentence}", err=True)
     if found.failed:
         raise SystemExit(1)
 
@@ -90,13 +94,6 @@ def _shown_progress() -> Iterator[Callable[[int, int], None] | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _write(file: str, text: str) -> None:
-    try:
-        Path(file).write_text(text, encoding="utf-8", newline="")
-    except OSError as error:
-        raise PidemuError(f"{file}: cannot be written: {error.strerror}") from None
-
-
 def _print(m: Matrix) -> None:
     """Print the table, in blocks of columns where it is too wide, and what the conversions came to."""
     width = min(shutil.get_terminal_size().columns, 400) if sys.stdout.isatty() else _PIPED
@@ -112,7 +109,7 @@ def _print(m: Matrix) -> None:
         columns = slice(start, start + per_block)
         shown = heads[columns]
         table(["", *shown], [[r, *row[columns]] for r, row in zip(rows, marks, strict=True)], right=range(1, len(shown) + 1))
-        click.echo()
+        echo()
     heading(_summary(m))
     wrapped(_LEGEND + ("" if m.emulated else _ALONE))
 

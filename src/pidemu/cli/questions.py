@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from pidemu.cli.common import number, print_json
+from pidemu.cli.common import echo, number, print_json
 from pidemu.conversion.document import question_document
 from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
@@ -18,28 +16,28 @@ def print_questions(error: QuestionError, source: Settings | None, goal: str, as
     if as_json:
         known = {} if source is None else {"from": source.to_dict(), "to": {"card": goal}}
         print_json(question_document(error, known))
-        click.echo(f"question: {error}", err=True)
+        echo(f"question: {error}", err=True)
         return
     for question in error.questions:
         _print(question)
     if source is not None and all(q.readings and q.kind != "action" for q in error.questions):
-        click.echo("\n--assume takes the first reading of each question, and says so.", err=True)
+        echo("\n--assume takes the first reading of each question, and says so.", err=True)
 
 
 def _print(question: Question) -> None:
-    click.echo(f"question: {question.text}", err=True)
+    echo(f"question: {question.text}", err=True)
     for k, answer in enumerate(question.readings, start=1):
         says = f" ({answer.says})" if answer.says else ""
-        click.echo(f"\n{k}. {answer.value}{says}", err=True)
+        echo(f"\n{k}. {answer.value}{says}", err=True)
         for text in answer.alike:
-            click.echo(f"   or {text}", err=True)
+            echo(f"   or {text}", err=True)
         if answer.conversion is not None:
-            click.echo(f"   -> {dials_line(answer.conversion)}", err=True)
-            click.echo(f"   {answer.conversion.verdict}", err=True)
+            echo(f"   -> {dials_line(answer.conversion)}", err=True)
+            echo(f"   {answer.conversion.verdict}", err=True)
         elif answer.outcome:
-            click.echo(f"   {answer.outcome}", err=True)
+            echo(f"   {answer.outcome}", err=True)
         if answer.command:
-            click.echo(f"   {answer.command}", err=True)
+            echo(f"   {answer.command}", err=True)
 
 
 def dials_line(c: Conversion) -> str:

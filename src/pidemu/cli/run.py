@@ -14,17 +14,18 @@ from pidemu.cli.common import (
     action_option,
     asked_for,
     assignments,
+    echo,
     engine_option,
     json_option,
     limits_option,
     number,
-    opened,
     print_json,
     vendors_option,
 )
 from pidemu.cli.happened import tell
 from pidemu.emulator import Controller
-from pidemu.errors import SettingError, suggest
+from pidemu.errors import RecordError, SettingError, suggest
+from pidemu.files.writing import beside, check
 from pidemu.plain import json_safe
 from pidemu.record.files import Floats, Record, read_record, write_record
 from pidemu.record.playback import Playback, Timing, play, timing
@@ -97,6 +98,9 @@ def command(
         check_picture(picture)
     settings = load_card(card, vendors).settings(assignments(values))
     record = read_record(file)
+    for path in (target, picture):
+        if path is not None:  # now, and not after the work
+            check(path, RecordError, (file, card))
     when = timing(record, file, scan, settings)
     start = _initial(record) if initial_output is None else initial_output
     kind: Action = "direct" if action == "direct" else "reverse"
@@ -106,20 +110,21 @@ def command(
     playback = play(controller, record, file, when.interval)
     emulated = playback.outputs
     if target is not None or not as_json:
-        _write(record, emulated, target)
+        _write(record, emulated, target, (file, card))
     if as_json:
         print_json(_plain(controller, record, playback))
     bounds = limits or settings.equation.output.limits
-    for note in (*settings.notes, *_notes(record, controller, when, bias, bounds, kind), *left):
-        click.echo(f"note: {note}", err=True)
+    skipped = [f"{file}: {record.skipped}"] if record.skipped else []
+    for note in (*skipped, *settings.notes, *_notes(record, controller, when, bias, bounds, kind), *left):
+        echo(f"note: {note}", err=True)
     uneven = "" if when.interval is None else ", as the intervals were recorded"
-    click.echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
+    echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
     if engine is not None:
-        click.echo(f"engine: {controller.engine}", err=True)
+        echo(f"engine: {controller.engine}", err=True)
     if not as_json:
         tell(playback)
     if record.output is not None:
-        click.echo(_difference(record, emulated), err=True)
+        echo(_difference(record, emulated), err=True)
     if picture is not None:
         from pidemu.plots import plot_run
 
@@ -177,11 +182,11 @@ def _plain(controller: Controller, record: Record, playback: Playback) -> dict[s
     return safe
 
 
-def _write(record: Record, emulated: Floats, target: str | None) -> None:
+def _write(record: Record, emulated: Floats, target: str | None, inputs: tuple[str, ...]) -> None:
     if target is None:
         write_record(record, {"emulated": emulated}, sys.stdout)
         return
-    with opened(target) as stream:
+    with beside(target, RecordError, inputs) as stream:
         write_record(record, {"emulated": emulated}, stream)
 
 

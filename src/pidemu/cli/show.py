@@ -22,6 +22,7 @@ from pidemu.cli.common import (
     Range,
     Time,
     assignments,
+    echo,
     heading,
     json_option,
     number,
@@ -32,6 +33,7 @@ from pidemu.cli.common import (
 )
 from pidemu.cli.common import given as given_ranges
 from pidemu.errors import SettingError, suggest
+from pidemu.excerpt import visible
 from pidemu.explanation.explain import explain
 from pidemu.explanation.model import Explanation
 from pidemu.explanation.text import sections, table_lines
@@ -117,12 +119,12 @@ def _explained(e: Explanation) -> None:
     for name, rows in sections(e):
         heading(f"\n{name}")
         for line in table_lines(rows):
-            click.echo(line)
+            echo(line)
 
 
 def _sheet(rows: Sequence[Sequence[str]], columns: Sequence[str] = ()) -> None:
     """Print aligned columns, the last of which is wrapped."""
-    lines = [*([columns] if columns else []), *rows]
+    lines = [[visible(cell) for cell in line] for line in (*([columns] if columns else []), *rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]) - 1)]
     indent = 2 + sum(w + 2 for w in widths)
     total = min(_WIDTH, shutil.get_terminal_size().columns) if sys.stdout.isatty() else _WIDTH

@@ -16,19 +16,21 @@ from pidemu.cli.common import (
     Time,
     asked_for,
     assignments,
+    echo,
     engine_option,
     given,
     heading,
     json_option,
     load_option,
     number,
-    opened,
     print_json,
     setpoint_option,
     table,
     vendors_option,
 )
 from pidemu.engines import Choice, checked
+from pidemu.errors import RecordError
+from pidemu.files.writing import beside, check
 from pidemu.fleet.blocks import COLUMNS, figures_of
 from pidemu.loop.outcome import has_settled, margins_of, stability_of
 from pidemu.loop.process import parse_process
@@ -103,12 +105,14 @@ def command(
     over less than 5 % of its largest value in the last fifth of the run. The margins are those of the sampled loop within limits.
     """
     settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
+    if target is not None:  # now, and not after the work
+        check(target, RecordError, [card])
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
     made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
     pv, out, choice = run_trial(made, forced)
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
-        with opened(target) as stream:
+        with beside(target, RecordError, [card]) as stream:
             write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
     figures = figures_of(made, pv, out)
     margins = margins_of(made)
@@ -117,7 +121,7 @@ def command(
     else:
         _print(made, choice if engine else None, figures, margins)
     for note in (*settings.notes, *_notes(made, kind, margins, has_settled(figures["swing"], figures["peak"]))):
-        click.echo(f"note: {note}", err=True)
+        echo(f"note: {note}", err=True)
 
 
 def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool) -> Iterator[str]:

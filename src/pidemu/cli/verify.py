@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from pidemu.cli.common import heading, json_option, print_json, vendors_option, wrapped
+from pidemu.cli.common import echo, heading, json_option, print_json, vendors_option, wrapped
 from pidemu.conversion.verify import Verification, verify
 
 _SHOWN = 8
@@ -36,13 +36,13 @@ def _print(v: Verification) -> None:
         for text in v.versions:
             wrapped(f"though {text}", "  - ")
         return
-    click.echo("changed:")
+    echo("changed:")
     shown = {kind: [c for c in v.changes if c.kind == kind] for kind in dict.fromkeys(c.kind for c in v.changes)}
     for kind, changes in shown.items():
         for change in changes[:_SHOWN]:
             wrapped(str(change), "  - ")
         if len(changes) > _SHOWN:
-            click.echo(f"    and {len(changes) - _SHOWN} more of kind '{kind}' (--json lists all)")
-    click.echo("because:")
+            echo(f"    and {len(changes) - _SHOWN} more of kind '{kind}' (--json lists all)")
+    echo("because:")
     for text in v.because:
         wrapped(text, "  - ")

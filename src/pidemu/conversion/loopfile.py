@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationError
 
@@ -13,11 +14,14 @@ from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
+from pidemu.excerpt import visible
+from pidemu.files.reading import Kind, is_folder
 
 Interval = Annotated[
     Annotated[Number, Tag("one")] | Annotated[list[Number], Field(min_length=1, max_length=2), Tag("two")],
     Discriminator(lambda given: "two" if isinstance(given, list) else "one"),  # so that an error is about what was written
 ]
+_KIND: Final = Kind("a loop file", "a loop file is YAML text that states card: and settings:", limit=2**20)
 
 
 class LoopFile(Model):
@@ -88,9 +92,9 @@ def read_loop(file: Path) -> Loop:
     CardError
         The file is missing, or wrong: every problem, located.
     """
-    if not file.is_file():
-        raise CardNotFoundError(f"no file '{file}'")
-    document = parse_file(file)
+    if not os.path.exists(file) or is_folder(file):
+        raise CardNotFoundError(f"no file '{visible(str(file))}'")
+    document = parse_file(file, kind=_KIND)
     try:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:

@@ -14,10 +14,14 @@ import pidemu
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.schema import ConversionPart
 from pidemu.errors import CertificateError
+from pidemu.excerpt import visible
+from pidemu.files.quoting import quoted
+from pidemu.files.reading import Kind, read_text
 
 LARGEST: Final = 16 * 2**20
 """Size of a file beyond which it is not read [bytes]; a certificate has some 50 kB."""
 _AGAIN: Final = "write the certificate again with 'pidemu convert ... --json'"
+_KIND: Final = Kind("a certificate", _AGAIN, LARGEST)
 
 
 class Signed(ConversionPart):
@@ -43,26 +47,8 @@ def read_signed(source: str | Path | Mapping[str, Any]) -> tuple[str, Signed]:
     """
     if isinstance(source, Mapping):
         return "certificate", _checked("certificate", dict(source))
-    name = str(source)
-    return name, _checked(name, _parsed(name, _text(name)))
-
-
-def _text(name: str) -> str:
-    try:
-        with Path(name).open("rb") as file:
-            found = file.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # a name with a null character is a ValueError
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise CertificateError(f"{name}: cannot be read: {reason}") from None
-    if len(found) > LARGEST:
-        raise CertificateError(
-            f"{name}: larger than {LARGEST // 2**20} MB, which no certificate is; name the file of one conversion"
-        )
-    try:
-        return found.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = found[: error.start].count(b"\n") + 1
-        raise CertificateError(f"{name}:{line}: not UTF-8 text, so not a certificate; {_AGAIN}") from None
+    name = visible(str(source))
+    return name, _checked(name, _parsed(name, read_text(source, CertificateError, _KIND, controls=False)))
 
 
 def _parsed(name: str, text: str) -> Any:
@@ -88,7 +74,7 @@ def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"the key '{key[:60]}' stands twice in one place")
+            raise ValueError(f"the key '{quoted(key)}' stands twice in one place")
         found[key] = value
     return found
 
@@ -99,8 +85,8 @@ def _checked(name: str, plain: Any) -> Signed:
         raise CertificateError(f'{name}: not a certificate, as it does not begin with "schema": "{SCHEMA}"; {_AGAIN}')
     if form != SCHEMA:
         raise CertificateError(
-            f"{name}: schema: the form is '{str(form)[:60]}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with the "
-            "pidemu that wrote it, or convert again"
+            f"{name}: schema: the form is '{quoted(form)}', and pidemu {pidemu.__version__} reads '{SCHEMA}'; verify it with "
+            "the pidemu that wrote it, or convert again"
         )
     if plain.get("verdict") in ("question", "refused"):
         what = "a question that has to be answered first" if plain["verdict"] == "question" else "a refusal"
@@ -124,9 +110,9 @@ def _fault(error: ErrorDetails, plain: Any) -> str:
         )
         if inside:
             value = value[step]
-            path.append(str(step)[:60])
+            path.append(quoted(step))
     if error["type"] == "missing":
-        return f"{'.'.join([*path, str(error['loc'][-1])])}: missing"
+        return f"{'.'.join([*path, quoted(error['loc'][-1])])}: missing"
     place = ".".join(path)
     if error["type"] == "extra_forbidden":
         return f"{place}: an unknown key"
@@ -137,4 +123,4 @@ def _fault(error: ErrorDetails, plain: Any) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return "a list" if isinstance(value, list) else "a group of keys"
-    return json.dumps(value)[:60]
+    return quoted(json.dumps(value))

@@ -10,10 +10,11 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.engines import Choice, block, for_loops
-from pidemu.fleet.blocks import Outcome, Room, run_block
+from pidemu.engines import Choice, block, for_loops, instead, one_by_one
+from pidemu.errors import FleetError
+from pidemu.fleet.blocks import Outcome, Room, Stopped, run_block
 from pidemu.fleet.loops import Loop, Plan
-from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared
+from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared, reason_of
 from pidemu.scan.program import Structure
 from pidemu.targets.runner import Block
 
@@ -83,13 +84,12 @@ class _Threads:
         self._stop = threading.Event()
         self._free = None if room is None else threading.Semaphore(2 * count)
         self._pool = ThreadPoolExecutor(count, thread_name_prefix="fleet")
-        self._done: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
+        self._done: queue.SimpleQueue[Future[list[Outcome | Failed]]] = queue.SimpleQueue()
         self._left = 0
 
     def start(self, group: Group) -> None:
         """Run a group of loops."""
-        choice = for_loops(group.structure, group.scans, len(group.members), self._plan.engine)
-        function, width = block(group.structure, choice.engine)
+        choice, function, width = self._engine(group)
         if choice.engine in _ONE_AT_A_TIME:
             function = _in_turn(function)
         for part in group.parts(width, 2 if choice.engine in _SIDE_BY_SIDE else 1):
@@ -97,12 +97,39 @@ class _Threads:
             self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
             self._left += 1
 
-    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> Outcome:
+    def _engine(self, group: Group) -> tuple[Choice, Block, int]:
+        """Return what runs a group; one that cannot even begin is replaced."""
+        asked = self._plan.engine
+        try:
+            choice = for_loops(group.structure, group.scans, len(group.members), asked)
+            return choice, *block(group.structure, choice.engine)
+        except Exception as error:
+            choice = instead(asked or "numba", error)
+            return choice, *block(group.structure, choice.engine)
+
+    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> list[Outcome | Failed]:
         if self._free is not None:
             self._free.acquire()
-        return run_block(part, choice, function, width, self._room, self._stop.is_set)
+        try:
+            return [run_block(part, choice, function, width, self._room, self._stop.is_set)]
+        except (Stopped, FleetError):  # the latter where there is no room for signals: that is nobody's loop
+            raise
+        except Exception as error:
+            if (choice.engine, len(part)) == ("python", 1):
+                return [Failed(part[0].place, reason_of(error))]
+            return [self._alone(member, instead(choice.engine, error)) for member in part]
 
-    def done(self, most: int | None = None) -> Iterator[Outcome]:
+    def _alone(self, member: Prepared, choice: Choice) -> Outcome | Failed:
+        """Run a loop of a block that failed, in plain Python: what was wrong with one of them is no matter to the others."""
+        function = _in_turn(one_by_one(member.structure, choice.engine))
+        try:
+            return run_block([member], choice, function, 1, self._room, self._stop.is_set)
+        except (Stopped, FleetError):
+            raise
+        except Exception as error:
+            return Failed(member.place, reason_of(error))
+
+    def done(self, most: int | None = None) -> Iterator[Outcome | Failed]:
         """Yield what is done; wait until at most so many blocks are left, or not at all."""
         while self._left:
             waits = most is not None and self._left > most
@@ -113,7 +140,7 @@ class _Threads:
                     continue
                 return
             self._left -= 1
-            yield future.result()
+            yield from future.result()
             if self._free is not None:
                 self._free.release()
 

@@ -123,13 +123,26 @@ def _prepared(place: int, loop: Loop, plan: Plan, shared: dict[Structure, Struct
         trial = plan.trial(loop)
         program = measured(trial)
         margins = margins_if_any(trial) if plan.margins else None
-    except PidemuError as error:
-        return Failed(place, str(error))
-    except Exception as error:  # such as a text for a number: one wrong loop among thousands stops no other
-        return Failed(place, f"{type(error).__name__}: {error}; give the loop what pidemu.Loop documents")
-    structure = program.structure
-    return Prepared(
-        place, loop.tag, trial, shared.setdefault(structure, structure), program.values, program.initial, program.lengths, margins
+        structure = program.structure
+        shared_one = shared.setdefault(structure, structure)
+    except Exception as error:  # whatever it is: one wrong loop among thousands stops no other
+        return Failed(place, reason_of(error))
+    return Prepared(place, loop.tag, trial, shared_one, program.values, program.initial, program.lengths, margins)
+
+
+def reason_of(error: Exception) -> str:
+    """Return why a loop failed; what is not an error of pidemu's own is called what it is.
+
+    Parameters
+    ----------
+    error : Exception
+        What was raised.
+    """
+    if isinstance(error, PidemuError):
+        return str(error)
+    return (
+        f"internal error of this loop ({type(error).__name__}: {error}); give the loop what pidemu.Loop documents, "
+        f"and report it where that is done"
     )
 
 

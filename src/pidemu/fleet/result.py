@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import FleetError, suggest
+from pidemu.files.tables import write_table
 from pidemu.fleet.blocks import COLUMNS, Outcome
 from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
-from pidemu.fleet.writing import write_rows
 from pidemu.loop.trial import Trial
 
 Floats = npt.NDArray[np.float64]
@@ -179,4 +179,4 @@ class FleetResult:
         FleetError
             The file cannot be written.
         """
-        write_rows(path, HEADER, self.rows())
+        write_table(path, HEADER, self.rows(), FleetError)

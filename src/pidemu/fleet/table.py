@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +9,12 @@ from typing import Any, Final
 
 from pidemu.card.library import folders, load_card
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
+from pidemu.excerpt import visible
+from pidemu.files.quoting import quoted
+from pidemu.files.reading import Kind, control, read_text
+from pidemu.files.tables import Lines, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.result import HEADER, FleetResult
-from pidemu.fleet.writing import write_rows
 from pidemu.loop.process import parse_process
 from pidemu.scan.build import Action
 from pidemu.words import assignments, pair, seconds, step
@@ -20,6 +22,7 @@ from pidemu.words import assignments, pair, seconds, step
 COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
 """Columns of a file of loops."""
 _REQUIRED: Final = COLUMNS[:4]
+_KIND: Final = Kind("a table of loops", "save it as CSV text in UTF-8, with a header line such as tag,card,settings,process")
 _ACTIONS: Final[Mapping[str, Action]] = {"reverse": "reverse", "direct": "direct"}
 
 
@@ -57,19 +60,22 @@ class LoopTable:
         The line of each loop in the file, counted from 1.
     wrong : tuple of WrongRow
         The rows that make no loop, and why.
+    skipped : str
+        Which lines of the file say nothing, in words: ``skipped: 2 comment lines above the header``.
     """
 
     path: str
     loops: tuple[Loop, ...]
     lines: tuple[int, ...]
     wrong: tuple[WrongRow, ...]
+    skipped: str = ""
 
     def __len__(self) -> int:
         return len(self.lines) + len(self.wrong)
 
     def located(self, line: int, tag: str, reason: str) -> str:
         """Return a message with the place it is about: ``loops.csv:7: FIC-101: reason``."""
-        return ": ".join(part for part in (f"{self.path}:{line}", tag, reason) if part)
+        return ": ".join(part for part in (f"{visible(self.path)}:{line}", quoted(tag), quoted(reason, 2000)) if part)
 
     def rows(self, result: FleetResult | None) -> Iterator[dict[str, Any]]:
         """Yield a row per row of the file, with its line and the names of a result's table; what is not known is ``None``.
@@ -99,13 +105,13 @@ class LoopTable:
         Raises
         ------
         FleetError
-            The file cannot be written.
+            The file cannot be written, or is the file of loops.
         """
-        write_rows(path, HEADER, self.rows(result))
+        write_table(path, HEADER, self.rows(result), FleetError, inputs=[self.path])
 
 
 def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
-    """Read a CSV file of loops: a header line, a row per loop; lines that start with ``#`` are comments.
+    """Read a CSV file of loops: a header line, a row per loop; lines above these that begin with ``# `` are comments.
 
     The cells are separated by commas, or by semicolons where the header line has these. Columns, in any order: ``tag``, ``card``,
     ``settings`` (``GAIN=2; RESET=4; RATE=6 s``: dials in the card's units or with one, and options, by the card's names),
@@ -133,14 +139,15 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
         There is no such folder of cards.
     """
     folders(vendors)  # one that is not there is no fault of a row
-    (head, names), *rows = _lines(path)
+    lines = _lines(path)
+    (head, names), *rows = lines.rows
     delimiter = ";" if names.count(";") > names.count(",") else ","
     try:
         header = _header(_cells(names, delimiter))
     except FleetError as error:
-        raise FleetError(f"{path}:{head}: {error}") from None
+        raise FleetError(f"{visible(str(path))}:{head}: {error}") from None
     loops: list[Loop] = []
-    lines: list[int] = []
+    numbers: list[int] = []
     wrong: list[WrongRow] = []
     seen: dict[str, int] = {}
     for number, line in rows:
@@ -149,37 +156,33 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
             cells = _cells(line, delimiter)
             row = {name: cell for name, cell in zip(header, cells, strict=False) if cell}
             if len(cells) != len(header):
-                raise FleetError(
-                    f"{len(cells)} cells, the header has {len(header)}; put a cell that holds '{delimiter}' in quotation marks"
-                )
+                remedy = f"put a cell that holds '{delimiter}' in quotation marks"
+                remedy = "comments stand above the header" if cells[0].startswith("#") and len(cells) == 1 else remedy
+                raise FleetError(f"{len(cells)} cells, the header has {len(header)}; {remedy}")
             loops.append(_loop(row, number, seen, vendors))
-            lines.append(number)
+            numbers.append(number)
         except PidemuError as error:
             wrong.append(WrongRow(number, row.get("tag", ""), row.get("card", ""), _in_one_line(error)))
-    return LoopTable(str(path), tuple(loops), tuple(lines), tuple(wrong))
+    return LoopTable(str(path), tuple(loops), tuple(numbers), tuple(wrong), lines.skipped)
 
 
-def _lines(path: str | Path) -> list[tuple[int, str]]:
-    """Return the lines that say something, with their numbers."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise FleetError(f"{path}: not UTF-8 text; save the file as UTF-8") from None
-    except OSError as error:
-        raise FleetError(f"{path}: cannot be read: {error.strerror}") from None
-    lines = [(i, line) for i, line in enumerate(text.split("\n"), 1) if line.strip(" \t\r,;") and not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise FleetError(f"{path}: no loops; the file has a header line such as {','.join(_REQUIRED)} and one line per loop")
+def _lines(path: str | Path) -> Lines:
+    """Return the lines of a file; a control character costs its row only."""
+    lines = split_lines(read_text(path, FleetError, _KIND, controls=False), empty=" \t,;")
+    if len(lines.rows) < 2:
+        wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
+        raise FleetError(f"{visible(str(path))}: no loops; {wanted}")
     return lines
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    if line.count('"') % 2:
-        raise FleetError("a quotation mark is not closed; a row is one line, and a mark within a cell is doubled")
+    fault = control(line)
+    if fault is not None:
+        raise FleetError(fault)
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
-    except csv.Error as error:
-        raise FleetError(f"not a row of a CSV file ({error}); save the table as CSV text") from None
+        return [cell.strip() for cell in split_row(line, delimiter)]
+    except ValueError as error:
+        raise FleetError(str(error)) from None
 
 
 def _header(cells: Sequence[str]) -> list[str]:
@@ -187,7 +190,7 @@ def _header(cells: Sequence[str]) -> list[str]:
     names = [cell.casefold() for cell in cells]
     unknown = [cell for cell, name in zip(cells, names, strict=True) if name not in COLUMNS]
     if unknown:
-        which = ", ".join(f"'{cell}'{suggest(cell, COLUMNS)}" for cell in unknown)
+        which = quoted(", ".join(f"'{quoted(cell)}'{suggest(cell, COLUMNS)}" for cell in unknown), 400)
         raise FleetError(f"unknown column{'s' if len(unknown) > 1 else ''} {which}; columns: {', '.join(COLUMNS)}")
     missing = [name for name in _REQUIRED if name not in names]
     if missing:
@@ -223,7 +226,7 @@ def _action(text: str) -> Action:
     action = _ACTIONS.get(text.casefold())
     if action is None:
         raise SettingError(
-            f"'{text}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
+            f"'{quoted(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
         )
     return action
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from pidemu.errors import FleetError
 
@@ -18,27 +16,3 @@ def writing(path: Path, remedy: str) -> Iterator[None]:
         yield
     except OSError as error:
         raise FleetError(f"{path}: cannot be written: {error.strerror or error}; {remedy}") from None
-
-
-def write_rows(path: str | Path, header: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> None:
-    """Write the columns of a header as CSV; numbers are written so that they read back the same.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    header : sequence of str
-        The columns; what else is in a row is left out.
-    rows : iterable of mapping
-        Value by column; ``None`` is an empty cell.
-
-    Raises
-    ------
-    FleetError
-        The file cannot be written.
-    """
-    target = Path(path)
-    with writing(target, "give a file that can"), target.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, header, extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows(rows)

@@ -132,7 +132,7 @@ def _moved(p: Parts, process: SampledProcess, x: list[Name], was: Name, late: Na
     now = [*x, was, late]
     for i in reversed(range(n)):
         parts: list[Expr] = [
-            p.coefficient(f"process_a{i + 1}{j + 1}", weight, "what a scan adds, per state", "-") * state
+            p.coefficient(f"process_a{i + 1}_{j + 1}", weight, "what a scan adds, per state", "-") * state
             for j, (weight, state) in enumerate(zip(rows[i], now, strict=True))
             if weight
         ]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pidemu.certificate.models import LoopComparison, LoopFigures
 from pidemu.emulator import Controller
-from pidemu.engines import Choice, Engine, checked, for_record, runner
+from pidemu.engines import Choice, Engine, checked, for_record, safe_runner
 from pidemu.loop.experiment import integral_of_error
 from pidemu.loop.figures import loop_figures
 from pidemu.loop.hold import Plant
@@ -174,7 +174,7 @@ def run_trial(made: Trial, forced: Engine | None = None) -> tuple[Floats, Floats
     under_way = (min(length, made.scans) for length in program.lengths)  # what comes later is not seen
     state = [*starting(program), *(deque([0.0] * length) for length in under_way)]
     with np.errstate(all="ignore"):
-        out, pv = runner(program, choice.engine).run(state, [sp, load], made.scans)
+        out, pv = safe_runner(program, choice).run(state, [sp, load], made.scans)
     if not (np.isfinite(pv).all() and np.isfinite(out).all()):  # what a card does then is the emulator's to know
         pv, out = _scan_by_scan(controller, Plant(made.process.sampled(made.scan)), sp, load, made.initial)
         return pv, out, Choice("python", "scan by scan, as the measurement outgrows all numbers")

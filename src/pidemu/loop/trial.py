@@ -155,6 +155,8 @@ def trial(
     sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
     chosen = action or _negative_feedback(settings, process)
     limits = limits_for(settings, output_limits, _FULL)
+    if not limits[0] < limits[1]:
+        raise ProcessError(f"output limits {limits[0]:g} to {limits[1]:g} are not a range; give low, then high")
     if not limits[0] <= initial[2] <= limits[1]:
         raise ProcessError(
             f"the initial output {initial[2]:g} % is outside the output limits {limits[0]:g} to {limits[1]:g} %; give another, or "

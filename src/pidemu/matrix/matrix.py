@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any, Final
 
 from pidemu.card.library import card_files, load_card
 from pidemu.errors import ConversionRefusedError
+from pidemu.files.tables import write_rows
 from pidemu.matrix.cell import OUTCOMES, Cell, Work
 from pidemu.matrix.pairs import computed
 from pidemu.matrix.typical import has_terms
@@ -86,12 +86,13 @@ class Matrix:
     def to_csv(self) -> str:
         """Return one line per conversion under a header of `COLUMNS`; figures with four digits, empty where there are none."""
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for c in self.cells:
-            figures = ("" if x is None else f"{x:.4g}" for x in c.figures)
-            writer.writerow((c.source, c.target, c.verdict, *figures, c.match, c.given, c.settings, c.sentence, c.command))
+        write_rows(text, [COLUMNS, *map(_line, self.cells)])
         return text.getvalue()
+
+
+def _line(c: Cell) -> tuple[str, ...]:
+    figures = ("" if x is None else f"{x:.4g}" for x in c.figures)
+    return (c.source, c.target, c.verdict, *figures, c.match, c.given, c.settings, c.sentence, c.command)
 
 
 def counts(cells: Sequence[Cell]) -> dict[str, int]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
+import contextlib
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -15,6 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import RecordError, suggest
+from pidemu.excerpt import visible
+from pidemu.files.numbers import plain_number
+from pidemu.files.quoting import quoted
+from pidemu.files.reading import Kind, read_text
+from pidemu.files.tables import split_lines, split_row, write_rows
 
 Floats = npt.NDArray[np.float64]
 
@@ -35,6 +39,7 @@ _COLUMNS: Final = {
 _MAY_BE_EMPTY: Final = ("manual", "output", "cascade", "track", "external_reset", "feedforward", "interval")
 SIGNALS: Final = ("cascade", "track", "external_reset", "feedforward", "hold")
 """Columns that go to the controller as they are, under the names of its arguments."""
+_KIND: Final = Kind("a record", "save it as CSV text in UTF-8, with a header line such as sp,pv", limit=2**30)
 _TRUE: Final = {"1", "1.0", "true", "yes", "auto", "automatic", "a"}
 _FALSE: Final = {"0", "0.0", "false", "no", "man", "manual", "m"}
 
@@ -60,9 +65,13 @@ class Record:
     header : tuple of str
         Column names of the file.
     rows : tuple of tuple of str
-        Its cells, as they stand.
+        Its cells, as they stand, without blanks around.
     names : mapping
         The file's own name of a column, by the names above.
+    comments : tuple of str
+        The comment lines above the header.
+    skipped : str
+        Which lines of the file say nothing, in words: ``skipped: 2 comment lines above the header``.
     """
 
     sp: Floats
@@ -80,6 +89,8 @@ class Record:
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
+    comments: tuple[str, ...] = ()
+    skipped: str = ""
 
     @property
     def signals(self) -> dict[str, Floats]:
@@ -97,11 +108,12 @@ class Record:
 
 
 def read_record(path: str | Path) -> Record:
-    """Read a CSV file with a header line; lines that start with ``#`` are comments.
+    """Read a CSV file with a header line; lines above it that begin with ``# ``, or are just ``#``, are comments.
 
     Columns are found by name, in any case: ``sp``, ``pv``, ``time`` (or ``t``: seconds or timestamps), ``auto``, ``manual`` (or
     ``man``), ``output`` (or ``out``, ``op``), ``cascade`` (or ``cas``, ``rsp``), ``track``, ``external_reset``, ``feedforward`` (or
-    ``ff``), ``hold``, ``interval`` (or ``dt``); others are kept and ignored.
+    ``ff``), ``hold``, ``interval`` (or ``dt``); others are kept and ignored. Numbers are written with the digits 0 to 9 and a
+    decimal point; ``nan`` and ``inf`` where the signal was none.
 
     Parameters
     ----------
@@ -113,28 +125,36 @@ def read_record(path: str | Path) -> Record:
     RecordError
         The file cannot be read, lacks a column, or holds what is not a number: with line and column name.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise RecordError(f"{path}: not UTF-8 text; save the file as UTF-8") from None
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise RecordError(f"{path}: no samples; a record has a header line such as sp,pv and one line per scan")
-    dialect = csv.get_dialect("excel")
-    table = [(i, next(csv.reader([line], dialect))) for i, line in lines]
-    header = [cell.strip() for cell in table[0][1]]
-    places = _places(str(path), table[0][0], header)
+    lines = split_lines(read_text(path, RecordError, _KIND))
+    shown = visible(str(path))
+    if len(lines.rows) < 2:
+        raise RecordError(f"{shown}: no samples; a record has a header line such as sp,pv and one line per scan")
+    table = [(i, _row(f"{shown}:{i}", line)) for i, line in lines.rows]
+    header = table[0][1]
+    places = _places(shown, table[0][0], header)
     for i, row in table[1:]:
         if len(row) != len(header):
-            raise RecordError(f"{path}:{i}: {len(row)} cells, the header has {len(header)}")
+            remark = "; comments stand above the header" if row[0].startswith("#") else ""
+            raise RecordError(f"{shown}:{i}: {len(row)} cells, the header has {len(header)}{remark}")
     columns: dict[str, Floats] = {}
     for name, at in places.items():
-        cells = [(f"{path}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
+        cells = [(f"{shown}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
         columns[name] = _times(cells) if name == "time" else np.array([_cell(*cell, name) for cell in cells])
-    rows = tuple(tuple(row) for _, row in table[1:])
-    return Record(header=tuple(header), rows=rows, names={name: header[at] for name, at in places.items()}, **columns)
+    return Record(
+        header=tuple(header),
+        rows=tuple(tuple(row) for _, row in table[1:]),
+        names={name: header[at] for name, at in places.items()},
+        comments=lines.comments,
+        skipped=lines.skipped,
+        **columns,
+    )
+
+
+def _row(where: str, line: str) -> list[str]:
+    try:
+        return split_row(line)
+    except ValueError as error:
+        raise RecordError(f"{where}: {error}") from None
 
 
 def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
@@ -148,7 +168,8 @@ def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
     for name in ("sp", "pv"):
         if name not in places:
             split = "; the cells are separated by semicolons, save the file with commas" if ";" in "".join(header) else ""
-            raise RecordError(f"{path}:{line}: no column '{name}' among {', '.join(header)}{suggest(name, header)}{split}")
+            among = quoted(", ".join(header), 200)
+            raise RecordError(f"{path}:{line}: no column '{name}' among {among}{suggest(name, header)}{split}")
     return places
 
 
@@ -161,11 +182,9 @@ def _cell(where: str, text: str, name: str) -> float:
     if not word:
         raise RecordError(f"{where}: empty; every sample needs a number")
     try:
-        value = float(word)
-    except ValueError:
-        if re.fullmatch(r"[+-]?\d+,\d+", word):
-            raise RecordError(f"{where}: '{text}' has a comma; write a decimal point") from None
-        raise RecordError(f"{where}: '{text}' is not a number") from None
+        value = plain_number(text, words=True)
+    except ValueError as error:
+        raise RecordError(f"{where}: {error}") from None
     if name == "interval" and math.isnan(value):
         raise RecordError(f"{where}: '{text}' is not an interval; leave the cell empty for the nominal one")
     if name in SIGNALS and math.isinf(value):
@@ -180,7 +199,7 @@ def _yes_or_no(where: str, text: str, name: str) -> float:
     if word in _TRUE or word in _FALSE:
         return float(word in _TRUE)
     meaning = ("automatic", "manual") if name == "auto" else ("hold", "no hold")
-    raise RecordError(f"{where}: '{text}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
+    raise RecordError(f"{where}: '{quoted(text)}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
 
 
 def _times(cells: Iterable[tuple[str, str]]) -> Floats:
@@ -192,41 +211,36 @@ def _times(cells: Iterable[tuple[str, str]]) -> Floats:
         if isinstance(x, datetime) and isinstance(first, datetime):
             out.append((x - first).total_seconds())
         elif isinstance(x, datetime) or isinstance(first, datetime):
-            raise RecordError(f"{where}: '{text}' is not like the cells above; write seconds or timestamps throughout")
+            raise RecordError(f"{where}: '{quoted(text)}' is not like the cells above; write seconds or timestamps throughout")
         else:
             out.append(x)
     return np.array(out)
 
 
 def _time(where: str, text: str) -> float | datetime:
-    try:
-        value = float(text)
-    except ValueError:
-        pass
-    else:
-        if math.isfinite(value):
-            return value
+    with contextlib.suppress(ValueError):
+        return plain_number(text)
     try:
         stamp = datetime.fromisoformat(text)
     except ValueError:
         wanted = "a number of seconds nor a timestamp such as 2026-11-22T08:00:05"
-        raise RecordError(f"{where}: '{text}' is neither {wanted}") from None
+        raise RecordError(f"{where}: '{quoted(text)}' is neither {wanted}") from None
     return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)  # a clock change is no gap
 
 
 def write_record(record: Record, columns: Mapping[str, Iterable[float]], stream: TextIO) -> None:
-    """Write a record with more columns.
+    """Write a record with its comments and with more columns.
 
     Parameters
     ----------
     record : Record
-        The record, with its header and rows.
+        The record, with its comments, header and rows.
     columns : mapping
         Values of the new columns by name, written so that they read back the same.
     stream : text stream
         Where to.
     """
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*record.header, *columns])
-    for row, *values in zip(record.rows, *columns.values(), strict=True):
-        writer.writerow([*row, *(repr(float(value)) for value in values)])
+    stream.writelines(f"{comment}\n" for comment in record.comments)
+    write_rows(stream, [[*record.header, *columns]])
+    rows = zip(record.rows, *columns.values(), strict=True)
+    write_rows(stream, ([*row, *(repr(float(value)) for value in values)] for row, *values in rows))

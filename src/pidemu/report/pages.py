@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pidemu.errors import PidemuError
+from pidemu.files.writing import beside
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -29,7 +30,5 @@ def write(path: str | Path, text: str) -> None:
     PidemuError
         The file cannot be written.
     """
-    try:
-        Path(path).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise PidemuError(f"{path}: cannot be written: {error.strerror}") from None
+    with beside(path, PidemuError) as stream:
+        stream.write(text)

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.cache import folder, written
+from pidemu.cache import folder, keep, load
 from pidemu.errors import EngineError
 from pidemu.scan.program import Program, Structure
 from pidemu.scan.specialise import specialise
@@ -77,7 +77,7 @@ def runner(program: Program) -> Runner:
     Raises
     ------
     EngineError
-        There is no C compiler, or it does not compile what is printed.
+        There is no C compiler, it does not compile what is printed, or there is no room for what it makes.
     """
     compiled = _compiled(program.structure)
     values = (float(in_precision(program, q.name, x)) for q, x in zip(program.coefficients, program.values, strict=True))
@@ -103,9 +103,9 @@ def _compiled(structure: Structure) -> _Compiled:
     command = (*compiler(), *_FLAGS)
     text = library(program, _NAME)
     built = hashlib.sha256("\0".join([text, *command, sys.platform, platform.machine()]).encode()).hexdigest()[:24]
-    path = folder() / f"scan_{built}.so"
-    if not path.exists():
-        _compile(command, written(f"scan_{built}.c", text), path)
+    stem = f"scan_{built}"
+    kept = load(stem, ".so")
+    path = _compile(command, text, stem) if kept is None else kept[0]
     lines: list[_Member] = []
     for line in program.lines:
         lines += [
@@ -114,25 +114,35 @@ def _compiled(structure: Structure) -> _Compiled:
             (f"{line.name}_at", ctypes.c_size_t),
         ]
     return _Compiled(
-        ctypes.CDLL(str(path)),
+        _loaded(path),
         _structure("Settings", [(q.name, _c_type(program, q.name)) for q in program.coefficients]),
         _structure("State", [(q.name, _c_type(program, q.name)) for q in program.states] + lines),
         tuple(q.name for q in specialise(program).inputs),
     )
 
 
-def _compile(command: Sequence[str], source: Path, path: Path) -> None:
-    """Compile to a file that appears at once: another process never loads half of it."""
-    handle, unfinished = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    os.close(handle)
+def _compile(command: Sequence[str], text: str, stem: str) -> Path:
+    """Compile, and return the file of the cache folder that holds the library."""
     try:
-        done = subprocess.run([*command, "-o", unfinished, str(source), "-lm"], capture_output=True, text=True, check=False)
-        if done.returncode:
-            first = next(iter(done.stderr.strip().splitlines()), f"exit status {done.returncode}")
-            raise EngineError(f"the C compiler '{command[0]}' does not compile a scan program: {first}; name another one in CC")
-        os.replace(unfinished, path)
-    finally:
-        Path(unfinished).unlink(missing_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder(), prefix="build-") as build:
+            source, made = Path(build, "scan.c"), Path(build, "scan.so")
+            source.write_text(text, encoding="utf-8")
+            words = [*command, "-o", str(made), str(source), "-lm"]
+            done = subprocess.run(words, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False)
+            if done.returncode:
+                first = next(iter(done.stderr.strip().splitlines()), f"exit status {done.returncode}")
+                raise EngineError(f"the C compiler '{command[0]}' does not compile a scan program: {first}; name another one in CC")
+            return keep(stem, ".so", made.read_bytes())
+    except OSError as error:
+        why = error.strerror or error
+        raise EngineError(f"the engine 'c' cannot write what it compiles: {why}; name another folder in PIDEMU_CACHE") from None
+
+
+def _loaded(path: Path) -> ctypes.CDLL:
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:  # such as a file system from which nothing may be run
+        raise EngineError(f"the engine 'c' cannot load what it compiled: {error}; name another folder in PIDEMU_CACHE") from None
 
 
 def _structure(name: str, members: list[_Member]) -> type[ctypes.Structure]:

@@ -1,23 +1,22 @@
-"""A scan program as Numba functions: source kept in a cache folder, compiled once per structure (extra ``fast``)."""
+"""A scan program as Numba functions, compiled once per structure and kept in the cache folder (extra ``fast``)."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import chain
-from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.cache import written
+from pidemu.cache import is_kept
 from pidemu.scan.program import Program, Structure
 from pidemu.scan.specialise import specialise
+from pidemu.targets.numba_store import SUFFIX, Store, python_version
 from pidemu.targets.numba_text import WIDTH, block_text, module_text, record_text
 from pidemu.targets.runner import Block, Floats, Run, Runner
 
@@ -83,10 +82,8 @@ def is_compiled(structure: Structure, *, blocks: bool = False) -> bool:
     blocks : bool
         For blocks of loops, or for one loop over a record.
     """
-    path = _path(_block_source(structure) if blocks else _record_source(structure)[0])
-    function = "block" if blocks else "run_automatic"
-    version = f"py{sys.version_info.major}{sys.version_info.minor}"
-    return any(path.parent.glob(f"__pycache__/{path.stem}.{function}-*.{version}*.nbi"))
+    name = _name(_block_source(structure) if blocks else _record_source(structure)[0])
+    return is_kept(f"{name}.{'block' if blocks else 'run_automatic'}.{python_version()}.*", SUFFIX)
 
 
 def is_loaded(structure: Structure, *, blocks: bool = False) -> bool:
@@ -130,19 +127,19 @@ def _block_module(structure: Structure) -> ModuleType:
     return module
 
 
-def _path(text: str) -> Path:
-    return written(f"scan_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py", text)
+def _name(text: str) -> str:
+    return f"scan_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
 
 
 def _module(text: str) -> ModuleType:
-    """Return a module made from a file of the cache folder, beside which Numba keeps what it compiled."""
-    path = _path(text)
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module  # Numba looks it up by name when it loads what it kept
-    spec.loader.exec_module(module)
+    """Return a module made from its text; what Numba compiles of it is kept, and nothing but that is ever read from a file."""
+    name = _name(text)
+    module = ModuleType(name)
+    sys.modules[name] = module  # Numba looks it up by name when it loads what was kept
+    exec(compile(text, f"<{name}>", "exec"), module.__dict__)  # our own text: nothing of the user's goes into it
+    for function in ("run", "run_automatic", "block"):
+        if hasattr(module, function):
+            Store(f"{name}.{function}").attach(getattr(module, function))
     return module
 
 

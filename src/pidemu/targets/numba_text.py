@@ -17,7 +17,7 @@ _HEAD: Final = """from math import inf, nan
 from numba import njit
 from numpy import float32, float64
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
+jit = njit(nogil=True, error_model="numpy")
 """
 _STEP: Final = " " * 8
 _LOOP: Final = " " * 12

@@ -103,10 +103,10 @@ def _carried(scan: Scan, homes: dict[int, str]) -> list[int]:
             _copy(scan, s)
     owned: set[int] = set()
     for s in states:
-        if scan.finals[s] in owned and _in_buffer(scan, homes, scan.finals[s], ()):
+        if scan.finals[s] in owned and _in_buffer(scan, homes, scan.finals[s]):
             _copy(scan, s)
         owned.add(scan.finals[s])
-    return [s for s in states if _is_carried(scan, homes, s, ())]
+    return [s for s in states if _in_buffer(scan, homes, scan.starts[s])]
 
 
 def _copy(scan: Scan, state: int) -> None:
@@ -115,14 +115,19 @@ def _copy(scan: Scan, state: int) -> None:
     scan.values.append(Value("copy", (final,), scan.values[final].kind, f"state {state}"))
 
 
-def _is_carried(scan: Scan, homes: dict[int, str], state: int, seen: tuple[int, ...]) -> bool:
-    final = scan.finals[state]
-    return final != scan.starts[state] and state not in seen and _in_buffer(scan, homes, final, (*seen, state))
+def _in_buffer(scan: Scan, homes: dict[int, str], value: int) -> bool:
+    """Tell whether a value is in a buffer when a scan ends.
 
-
-def _in_buffer(scan: Scan, homes: dict[int, str], value: int, seen: tuple[int, ...]) -> bool:
-    if scan.values[value].what == "start":
-        return _is_carried(scan, homes, scan.starts.index(value), seen)
+    What a state held when the scan began is where that state's last value was put in the scan before, and so on: a history of
+    outputs is a thousand states long. A state that keeps its value, and states that only change places, are in no buffer.
+    """
+    passed: set[int] = set()
+    while scan.values[value].what == "start":
+        state = int(scan.values[value].label)
+        if scan.finals[state] == value or state in passed:
+            return False
+        passed.add(state)
+        value = scan.finals[state]
     return scan.computed(value) and value not in homes
 
 
