@@ -222,14 +222,15 @@ def test_an_interrupted_fleet_gives_what_is_done(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(FleetResult, "add", interrupted)
     status, out, err = said("fleet", "loops.csv", "--cores", "1", "--table", "out.csv")
-    assert status == 1
+    assert status == 130
     assert err.splitlines()[-1] == "interrupted: 1 of 4 loops are done"
     assert out.splitlines()[0].startswith("loops.csv: 4 loops, 1 done, ")
     assert "not run" in {row["status"] for row in rows("out.csv").values()}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are another matter there")
-def test_ctrl_c_ends_the_run_and_prints_and_writes_what_is_done(folder: Path) -> None:
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_ctrl_c_and_sigterm_end_the_run_and_print_and_write_what_is_done(number: int, status: int, folder: Path) -> None:
     loops = "".join(SLOW.replace("TIC-2", f"TIC-{i}").replace(",1,\n", ",1,2e4\n") for i in range(300))
     (folder / "long.csv").write_text(HEAD + FAST + loops, encoding="utf-8")
     words = ["fleet", "long.csv", "--engine", "python", "--cores", "1", "--signals", "kept", "--table", "out.csv"]
@@ -237,11 +238,11 @@ def test_ctrl_c_ends_the_run_and_prints_and_writes_what_is_done(folder: Path) ->
     while len(list(folder.glob("kept/block-*.npy"))) < 3:  # two blocks are done then
         time.sleep(0.02)
         assert process.poll() is None, process.communicate()
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate(timeout=30)
     done = [tag for tag, row in rows("out.csv").items() if row["status"] == "done"]
     assert 0 < len(done) < 301
-    assert (process.returncode, err) == (1, f"interrupted: {len(done)} of 301 loops are done\n")
+    assert (process.returncode, err) == (status, f"interrupted: {len(done)} of 301 loops are done\n")
     assert out.splitlines()[0] == f"long.csv: 301 loops, {len(done)} done, {301 - len(done)} not run; 1 not settled at the end"
 
 
@@ -265,7 +266,10 @@ def test_what_cannot_be_done_is_said_with_status_2(line: str, message: str, fold
 def test_a_folder_that_holds_signals_already_is_refused() -> None:
     told("fleet", "good.csv", "--signals", "kept")
     status, _, err = said("fleet", "good.csv", "--signals", "kept")
-    assert (status, err) == (2, "error: kept holds the signals of a fleet already; give another folder, or empty it\n")
+    assert (status, err) == (
+        2,
+        "error: kept holds the signals of a fleet already; go on with them (--resume, resume=True), give another folder, or empty it\n",
+    )
 
 
 def test_cores_and_a_scheduler_are_one_too_many() -> None:

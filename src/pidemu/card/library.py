@@ -93,12 +93,12 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     file = Path(name) if name.endswith((".yaml", ".yml")) else None
     card_id = name if file is None else None
     if file is None:
-        file = next((f for d in folders(vendors) if (f := d / f"{name}.yaml").is_file()), None) if _is_id(name) else None
+        file = next((f for d in folders(vendors) if _is_file(f := d / f"{name}.yaml")), None) if _is_id(name) else None
         if file is None:
             known = cards(vendors)
             hint = suggest(name, known) or _suggest_block(name, known)
             raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
-    elif not file.is_file():
+    elif not _is_file(file):
         raise CardNotFoundError(f"no file '{name}'")
     key, changed = (file.absolute(), card_id), file.stat().st_mtime_ns
     kept = _loaded.get(key)
@@ -121,6 +121,13 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
 
     problems = check(card)
     return CardError(problems) if problems else card
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # such as a name that is longer than that of any file
+        return False
 
 
 def _suggest_block(name: str, known: list[str]) -> str:

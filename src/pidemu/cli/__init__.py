@@ -9,7 +9,7 @@ from typing import Final
 
 import click
 
-from pidemu.cli import streams
+from pidemu.cli import interrupts, streams
 from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError, suggest
 from pidemu.files.quoting import printable
 
@@ -54,6 +54,11 @@ class _Lazy(click.Group):
         except BrokenPipeError:  # the reader of the pipe had enough
             sys.stdout = None  # nothing to flush at exit
             raise SystemExit(0) from None
+        except EOFError as error:  # such as half a file; click would take it for Ctrl-D at a prompt, and end without a word
+            raise RuntimeError("a file or stream ended too early") from error
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            raise SystemExit(interrupts.status()) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         with formatter.section("Commands"):
@@ -66,7 +71,7 @@ def cli() -> None:
     """What a PID setting means on whose controller.
 
     Emulates the PID algorithms of industrial controllers and converts settings between them, with proof.
-    Exit status: 0; 1 for a refusal or a failed check; 2 for wrong usage.
+    Exit status: 0; 1 for a refusal or a failed check; 2 for wrong usage; 130 after Ctrl-C, 143 after SIGTERM.
     """
 
 
@@ -80,7 +85,8 @@ def main(arguments: list[str] | None = None) -> None:
     """
     streams.prepare()
     try:
-        status = _status(arguments)
+        with interrupts.terminable():
+            status = _status(arguments)
         streams.flush()
     except OSError as error:
         status = streams.report(error)
@@ -94,7 +100,7 @@ def _status(arguments: list[str] | None) -> object:
     except SystemExit as end:
         return end.code
     except click.exceptions.Abort:
-        return 130
+        return interrupts.status()
     except click.ClickException as error:
         shown = io.StringIO()
         error.show(shown)

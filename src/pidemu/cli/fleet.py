@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import click
 
+from pidemu.cli import interrupts
 from pidemu.cli.common import (
     Time,
     asked_for,
@@ -25,6 +26,7 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.errors import FleetError
+from pidemu.files.quoting import quoted
 from pidemu.files.writing import check
 from pidemu.fleet.fleet import Fleet
 from pidemu.fleet.judgement import MARGINS, RAN
@@ -50,6 +52,14 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 @click.option("--table", "target", metavar="FILE.csv", help="Write the table: a row per loop.")
 @click.option("--signals", metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files.")
 @click.option("--parquet", metavar="FILE", help="Write table and signals as a Parquet file.")
+@click.option("--resume", is_flag=True, help="Go on with a run that did not end: with what it left in --signals and --parquet.")
+@click.option(
+    "--worker-timeout",
+    type=Time(),
+    default="60 s",
+    show_default=True,
+    help="How long to wait for a worker where the cluster has none; 0 for ever.",
+)
 @click.option("--progress/--no-progress", default=None, help="A progress bar; by default for large fleets on a terminal.")
 @click.option("-v", "--verbose", is_flag=True, help="Say which engines ran, and how settings were read.")
 @vendors_option
@@ -66,6 +76,8 @@ def command(
     target: str | None,
     signals: str | None,
     parquet: str | None,
+    resume: bool,
+    worker_timeout: float,
     progress: bool | None,
     verbose: bool,
     vendors: tuple[str, ...],
@@ -80,6 +92,9 @@ def command(
     Shown are the largest absolute error (peak) and its integral (IAE), from the load step on or from the start where there is none;
     how far the output travelled, how long it was at its limits, the last error, and gain margin, phase margin and Ms of the sampled
     loop within its limits. A loop has settled where the error moves over less than 5 % of its peak in the last fifth of the run.
+
+    Ctrl-C and SIGTERM end the run: what is done is shown and written, and the exit status is 130 or 143. Where --signals or
+    --parquet are given, the same command with --resume goes on, also after a crash.
     """
     if scheduler is not None and cores is not None:
         raise click.UsageError("--cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out")
@@ -95,7 +110,8 @@ def command(
     if loops.loops:
         result = Fleet(loops.loops).simulate(
             time=time, folder=signals, parquet=parquet, engine=asked_for(engine), margins=margins, cores=cores,
-            cluster=scheduler, progress=progress, **given(setpoint=setpoint, load=load),
+            cluster=scheduler, progress=progress, resume=resume, worker_timeout=worker_timeout,
+            **given(setpoint=setpoint, load=load),
         )  # fmt: skip
     if target is not None:
         loops.write(target, result)
@@ -105,7 +121,9 @@ def command(
     else:
         _print(loops, rows, engines=verbose or engine is not None)
     _say(loops, result, verbose)
-    if result is None or result.interrupted or any(row["status"] == "failed" for row in rows):
+    if result is not None and result.interrupted:
+        raise SystemExit(interrupts.status())
+    if result is None or any(row["status"] == "failed" for row in rows):
         raise SystemExit(1)
 
 
@@ -117,6 +135,8 @@ def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
         notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
         for message in (*notes, *([reason] if reason else [])):
             echo(loops.located(line, loop.tag, message), err=True)
+    if result.resumed:
+        echo(f"resumed: {result.resumed:,} of {len(loops):,} loops were done already", err=True)
     if result.interrupted:
         done = sum(result.counts[status] for status in RAN)
         echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
@@ -130,6 +150,7 @@ def _plain(loops: LoopTable, rows: Sequence[Mapping[str, Any]], result: FleetRes
         "not_settled": _not_settled(rows),
         "engines": _engines(rows),
         "interrupted": result is not None and result.interrupted,
+        "resumed": 0 if result is None else result.resumed,
         "loops": rows,
     }
     safe: dict[str, Any] = json_safe(plain)
@@ -166,7 +187,7 @@ def _print(loops: LoopTable, rows: Sequence[Mapping[str, Any]], *, engines: bool
     failed = [row for row in rows if row["status"] == "failed"]
     if failed:
         heading("\nFailed")
-        table(["", "", ""], [[f"line {row['line']}", row["tag"], row["card"]] for row in failed[:_ROWS]])
+        table(["", "", ""], [[f"line {row['line']}", quoted(row["tag"]), quoted(row["card"])] for row in failed[:_ROWS]])
     if len(failed) > _ROWS:
         echo(f"  and {len(failed) - _ROWS:,} more; --table and --json list all")
 

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pidemu.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.local import outcomes
@@ -29,15 +30,19 @@ _AHEAD: Final = 3
 _PATIENCE: Final = 10.0
 """How long a scheduler may take to answer [s]."""
 _LOST: Final = "the cluster was lost; run the loop again"
+_QUIET: Final = 10.0
+"""How long a cluster may have no worker before that is said [s]."""
+_LOOK: Final = 1.0
+"""Seconds from one look at the workers to the next."""
 
 Numbered = tuple[int, Loop]
 
 
-def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan) -> Generator[Outcome | Failed]:
+def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan, worker_timeout: float) -> Generator[Outcome | Failed]:
     """Run loops on a cluster, and yield what comes of them as it is done.
 
     The numbers are those of one machine: a loop's do not depend on the loops beside it. Chunks of a worker that is lost are run
-    again by Dask on another one; where the whole cluster is lost, the loops that are left fail.
+    again by Dask on another one; where the whole cluster is lost, or has no worker for long, the loops that are left fail.
 
     Parameters
     ----------
@@ -47,6 +52,8 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan) -> Generato
         Loops with their places in the fleet.
     plan : Plan
         What is done to them.
+    worker_timeout : float
+        How long to wait where there is no worker [s]; 0 for ever.
 
     Raises
     ------
@@ -55,22 +62,23 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan) -> Generato
     """
     distributed = _distributed()
     with _client(distributed, cluster) as client:
-        yield from _Chunks(distributed, client, loops, plan).outcomes()
+        yield from _Chunks(distributed, client, loops, plan, worker_timeout).outcomes()
 
 
 class _Chunks:
     """Chunks of loops: as many under way as keep all threads of the cluster busy, each of some seconds."""
 
-    def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: Plan) -> None:
+    def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: Plan, worker_timeout: float) -> None:
         self._distributed, self._client, self._plan = distributed, client, plan
         self._loops, self._size = iter(loops), _FIRST
         self._under_way: dict[Any, list[Numbered]] = {}
+        self._workers = _Workers(client, worker_timeout)
 
     def outcomes(self) -> Iterator[Outcome | Failed]:
         """Yield what comes of the loops."""
         done = self._distributed.as_completed(self._submitted(), loop=self._client.loop)
         try:
-            for future in done:
+            for future in self._workers.waited(done):
                 if future.cancelled():
                     break
                 chunk = self._under_way.pop(future)
@@ -80,7 +88,7 @@ class _Chunks:
                 if self._client.status == "running":
                     done.update(self._submitted())
             left = itertools.chain(*self._under_way.values(), self._loops)
-            yield from (Failed(place, _LOST) for place, _ in left)
+            yield from (Failed(place, self._workers.fault or _LOST) for place, _ in left)
         finally:
             if self._client.status == "running":
                 self._client.cancel(list(self._under_way))
@@ -93,6 +101,51 @@ class _Chunks:
             new.append(self._client.submit(run_chunk, chunk, self._plan, pure=False, retries=2))
             self._under_way[new[-1]] = chunk
         return new
+
+
+class _Workers:
+    """Waits for what workers do, and not for ever where there is none."""
+
+    def __init__(self, client: Any, timeout: float) -> None:
+        self._client, self._timeout = client, timeout
+        self._since: float | None = None
+        self._said = False
+        self.fault = ""
+
+    def waited(self, done: Any) -> Iterator[Any]:
+        """Yield futures as they are done; end where all are, or where there has been no worker for too long."""
+        looked = time.monotonic()
+        while not done.is_empty():
+            if done.has_ready():
+                self._since = None
+                yield next(done)
+                looked = time.monotonic()
+                continue
+            time.sleep(0.02)
+            if time.monotonic() - looked > _LOOK:
+                looked = time.monotonic()
+                if self._given_up():
+                    return
+
+    def _given_up(self) -> bool:
+        """Tell whether there has been no worker for too long; say so when it begins to be long."""
+        if self._client.status != "running" or self._client.nthreads():
+            self._since, self._said = None, False
+            return False
+        self._since = time.monotonic() if self._since is None else self._since
+        waited = time.monotonic() - self._since
+        if 0 < self._timeout <= waited:
+            self.fault = f"the cluster had no worker for {self._timeout:g} s; start some with 'dask worker', and run the loop again"
+            return True
+        if waited >= _QUIET and not self._said:
+            self._said = True
+            end = f"waiting until there have been none for {self._timeout:g} s" if self._timeout > 0 else "waiting for one"
+            warn(f"{_address(self._client)} has no workers; {end}; 'dask worker ADDRESS' starts one")
+        return False
+
+
+def _address(client: Any) -> str:
+    return str(client.scheduler.address) if client.scheduler is not None else "the cluster"
 
 
 def run_chunk(chunk: Sequence[Numbered], plan: Plan) -> tuple[list[Outcome | Failed], float]:

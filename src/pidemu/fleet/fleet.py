@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from pidemu.engines import Engine, checked
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.finished import keys
 from pidemu.fleet.local import outcomes
 from pidemu.fleet.loops import Loop, Plan, unique
 from pidemu.fleet.prepare import Failed
@@ -62,11 +64,13 @@ class Fleet:
         cores: int | None = None,
         cluster: Any = None,
         progress: bool | None = None,
+        resume: bool = False,
+        worker_timeout: float = 60.0,
     ) -> FleetResult:
         """Run every loop from rest, as `pidemu.simulate` does, and with its numbers.
 
         A loop that cannot be run is reported in the result and does not stop the others. Where the run is interrupted (Ctrl-C),
-        what is done by then is returned.
+        what is done by then is returned. Where signals go to files, a run that did not end, whatever ended it, can be gone on with.
 
         Parameters
         ----------
@@ -92,6 +96,11 @@ class Fleet:
             Run on a Dask cluster: the scheduler's address, a client, or a cluster (needs the extra ``cluster``).
         progress : bool, optional
             Show a progress bar on standard error; by default where that is a terminal and the fleet is large.
+        resume : bool
+            Take what an earlier run of this fleet left complete in `folder` and `parquet`, and run the rest. Loops that are not
+            what they were then, in settings, process, steps or version of pidemu, are run again.
+        worker_timeout : float
+            How long to wait where the cluster has no worker [s]; the loops that are left have failed then. 0 waits for ever.
 
         Returns
         -------
@@ -110,22 +119,33 @@ class Fleet:
         result = FleetResult(self.loops)
         keeps = keep or folder is not None or parquet is not None
         plan = Plan(setpoint, load, time, keeps, checked(engine), margins)
-        with contextlib.ExitStack() as stack:
-            store = stack.enter_context(SignalStore(keep, folder, parquet)) if keeps else None
-            bar = stack.enter_context(Progress(len(self.loops), progress))
-            found = stack.enter_context(contextlib.closing(self._outcomes(plan, cores, cluster, store)))
-            try:
-                for one in found:
+        try:
+            with contextlib.ExitStack() as stack:
+                store = stack.enter_context(SignalStore(keep, folder, parquet, resume)) if keeps or resume else None
+                left = self._left(result, plan, store)
+                bar = stack.enter_context(Progress(len(left), progress))
+                run = self._outcomes(left, plan, cores, cluster, worker_timeout, store)
+                for one in stack.enter_context(contextlib.closing(run)):
                     kept = one if store is None or isinstance(one, Failed) else store.stored(one)
                     bar.advance(result.add(kept))
-            except KeyboardInterrupt:
-                result.interrupted = True
+        except KeyboardInterrupt:
+            result.interrupted = True
         return result
 
-    def _outcomes(self, plan: Plan, cores: int | None, cluster: Any, store: SignalStore | None) -> Generator[Outcome | Failed]:
-        loops = enumerate(self.loops)
+    def _left(self, result: FleetResult, plan: Plan, store: SignalStore | None) -> list[tuple[int, Loop]]:
+        """Return the loops that are to be run, with their places; the result takes those that an earlier run had done."""
+        done: set[int] = set()
+        if store is not None:
+            for place, one, signals in store.begin([loop.tag for loop in self.loops], keys(self.loops, plan)):
+                result.resume(place, one, signals, functools.partial(plan.trial, self.loops[place]))
+                done.add(place)
+        return [(place, loop) for place, loop in enumerate(self.loops) if place not in done]
+
+    def _outcomes(
+        self, loops: list[tuple[int, Loop]], plan: Plan, cores: int | None, cluster: Any, patience: float, store: SignalStore | None
+    ) -> Generator[Outcome | Failed]:
         if cluster is None:
             return outcomes(loops, plan, cores=cores, room=None if store is None else store.room)
         from pidemu.fleet.cluster import outcomes_on
 
-        return outcomes_on(cluster, loops, plan)
+        return outcomes_on(cluster, loops, plan, patience)

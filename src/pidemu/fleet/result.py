@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +15,8 @@ import numpy.typing as npt
 from pidemu.errors import FleetError, suggest
 from pidemu.files.tables import write_table
 from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.finished import Finished
+from pidemu.fleet.folder import Place
 from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
@@ -72,6 +75,8 @@ class FleetResult:
         What ran each loop.
     interrupted : bool
         Whether the run was interrupted; what was done by then is here.
+    resumed : int
+        How many loops an earlier run had done, whose results are here.
     """
 
     def __init__(self, loops: Sequence[Loop]) -> None:
@@ -84,8 +89,9 @@ class FleetResult:
         self.stable: list[bool | None] = [None] * count
         self.scan, self.scans = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self.interrupted = False
+        self.resumed = 0
         self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
-        self._signals: dict[int, tuple[Trial, Floats | Path, int]] = {}
+        self._signals: dict[int, tuple[Callable[[], Trial], Floats | Path, int]] = {}
 
     def add(self, found: Outcome | Failed) -> int:
         """Take what came of a block, or of a loop that failed; return how many loops that is."""
@@ -102,8 +108,30 @@ class FleetResult:
             self.engines[place] = found.engine.engine
             kept = found.records if found.file is None else found.file
             if kept is not None:
-                self._signals[place] = (member.trial, kept, i)
+                self._signals[place] = (partial(_itself, member.trial), kept, i)
         return len(places)
+
+    def resume(self, place: int, one: Finished, signals: Place | None, trial: Callable[[], Trial]) -> None:
+        """Take a loop that an earlier run had done.
+
+        Parameters
+        ----------
+        place : int
+            Its place in the fleet.
+        one : Finished
+            What came of it.
+        signals : (Path, int) or None
+            Where its signals are.
+        trial : callable
+            What was run, for whom wants the signals.
+        """
+        self._take(place, one.judged)
+        for name, value in one.figures.items():
+            self.columns[name][place] = value
+        self.scan[place], self.scans[place], self.engines[place] = one.scan, one.scans, one.engine
+        if signals is not None:
+            self._signals[place] = (trial, *signals)
+        self.resumed += 1
 
     def _take(self, place: int, judged: Judgement) -> None:
         self.status[place], self.settled[place], self.stable[place] = judged.status, judged.settled, judged.stable
@@ -141,7 +169,8 @@ class FleetResult:
                 if done
                 else f"loop '{tag}' has no signals: {self.reasons[place] or self.status[place]}"
             )
-        trial, kept, lane = self._signals[place]
+        made, kept, lane = self._signals[place]
+        trial = made()
         records = np.load(kept, mmap_mode="r") if isinstance(kept, Path) else kept
         out, pv = np.array(records[:, : trial.scans, lane])
         return Signals(trial.times, trial.setpoint, pv, out)
@@ -180,3 +209,7 @@ class FleetResult:
             The file cannot be written.
         """
         write_table(path, HEADER, self.rows(), FleetError)
+
+
+def _itself(trial: Trial) -> Trial:
+    return trial

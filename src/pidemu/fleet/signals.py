@@ -3,64 +3,84 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import itertools
-import os
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import COLUMNS, Outcome
-from pidemu.fleet.judgement import MARGINS, judgement
-from pidemu.fleet.writing import writing
+from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.finished import Finished, finished
+from pidemu.fleet.folder import Place, SignalFolder
+from pidemu.fleet.parquet import ParquetFile
 
 Floats = npt.NDArray[np.float64]
-INDEX: Final = "signals.csv"
-"""The file of a folder that says where the signals of each loop are."""
-_INDEX_HEADER: Final = ("tag", "file", "loop", "scan", "scans")
-_BLOCK: Final = "block-{}.npy"
-_OTHER_FILE: Final = "give a file that can be written, where there is enough room"
 
 
 class SignalStore:
     """Keeps the signals of a fleet, block by block, so that memory is bounded where they go to files.
-
-    In a folder, ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%], NaN after a loop's last scan; `INDEX`
-    names the file, the loop's number in it, scan interval [s] and number of scans for every tag. A Parquet file has a row per loop:
-    tag, card, status, scan interval, figures, margins, and the lists ``output`` and ``measurement``; it appears when the run is
-    over.
 
     Parameters
     ----------
     keep : bool
         Keep signals in memory where they do not go to a folder.
     folder : str or Path, optional
-        Folder for NumPy files; it is made where it is not there, and holds no signals yet.
+        Folder for NumPy files (`SignalFolder`).
     parquet : str or Path, optional
-        Parquet file.
+        Parquet file (`ParquetFile`).
+    resume : bool
+        Go on with what an earlier run left there.
 
     Raises
     ------
     FleetError
-        The folder holds signals already, a place cannot be written, or pyarrow is not installed.
+        There are signals already, a place cannot be written, there is nothing to go on with, or pyarrow is not installed.
     """
 
-    def __init__(self, keep: bool = True, folder: str | Path | None = None, parquet: str | Path | None = None) -> None:
-        self._keep, self._folder = keep, None if folder is None else Path(folder).resolve()  # as NumPy names its files
-        self._numbers = itertools.count(1)
-        self._unfinished: set[Path] = set()
-        self._index: list[tuple[object, ...]] = []
-        if self._folder is not None:
-            with writing(self._folder, "give a folder that can be made and written"):
-                self._folder.mkdir(parents=True, exist_ok=True)
-            if (self._folder / INDEX).exists() or any(self._folder.glob(_BLOCK.format("*"))):
-                raise FleetError(f"{folder} holds the signals of a fleet already; give another folder, or empty it")
-        self._parquet = None if parquet is None else _Parquet(Path(parquet))
+    def __init__(
+        self, keep: bool = True, folder: str | Path | None = None, parquet: str | Path | None = None, resume: bool = False
+    ) -> None:
+        if resume and folder is None and (parquet is None or keep):
+            raise FleetError(
+                "there is nothing to go on with: what is done is kept where signals go to files; "
+                "give the folder (--signals, folder=) or the Parquet file (--parquet, parquet=) of the run that did not end"
+            )
+        self._keep = keep
+        self._folder = None if folder is None else SignalFolder(Path(folder), resume)
+        self._parquet = None if parquet is None else ParquetFile(Path(parquet), resume)
+        self._keys: Sequence[str] = ()
+
+    def begin(self, tags: Sequence[str], keys: Sequence[str]) -> Iterator[tuple[int, Finished, Place | None]]:
+        """Yield what is complete already: the loop's place in the fleet, its row, and where its signals are.
+
+        Parameters
+        ----------
+        tags, keys : sequence of str
+            Tag and key of every loop of the fleet. What was run with other ones is dropped.
+        """
+        self._keys = keys
+        wanted = dict(zip(tags, keys, strict=True))
+        in_folder = None if self._folder is None else self._folder.found(wanted)
+        in_parquet = None if self._parquet is None else self._parquet.found(wanted)
+        kept = [t for t in tags if (in_folder is None or t in in_folder) and (in_parquet is None or t in in_parquet)]
+        if not kept and ((self._folder and self._folder.listed) or (self._parquet and self._parquet.listed)):
+            raise FleetError(
+                f"none of the loops in {self._folder or self._parquet} is one of this fleet as it is run now, with its settings, "
+                f"process, steps and this version of pidemu; give the place of the run that did not end, or an empty one"
+            )
+        if self._folder is not None and in_folder is not None:
+            self._folder.begin([in_folder[tag] for tag in kept])
+        if self._parquet is not None:
+            self._parquet.begin(kept)
+        places = {tag: i for i, tag in enumerate(tags)}
+        for tag in kept:
+            if in_folder is not None:
+                yield places[tag], *in_folder[tag]
+            elif in_parquet is not None:
+                yield places[tag], in_parquet[tag], None
 
     def __enter__(self) -> SignalStore:
         return self
@@ -73,16 +93,7 @@ class SignalStore:
         FleetError
             The file cannot be written, or there is no room for it.
         """
-        if self._folder is None:
-            return np.empty(shape)
-        path = self._folder / _BLOCK.format(f"{next(self._numbers):05d}")
-        self._unfinished.add(path)
-        with writing(path, "give a folder that can be written, with enough room"):
-            found: Floats = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=shape)
-            if hasattr(os, "posix_fallocate"):  # what there is no room for is refused here, and does not end the process later
-                with path.open("r+b") as file:
-                    os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
-        return found
+        return np.empty(shape) if self._folder is None else self._folder.room(shape)
 
     def stored(self, outcome: Outcome) -> Outcome:
         """Write the records of a block, and return the outcome with them, or with the file, where they are kept.
@@ -93,82 +104,20 @@ class SignalStore:
             They cannot be written.
         """
         assert outcome.records is not None
+        if self._folder is None and self._parquet is None:
+            return outcome
+        rows = finished(outcome, self._keys)
         if self._parquet is not None:
-            self._parquet.write(outcome)
+            self._parquet.add(outcome, rows)
         if self._folder is None:
             return outcome if self._keep else replace(outcome, records=None)
-        records = outcome.records
-        if not isinstance(records, np.memmap):  # from a worker of a cluster
-            here = self.room((records.shape[0], records.shape[1], records.shape[2]))
-            here[:] = records
-            records = here
-        assert isinstance(records, np.memmap)
-        path = Path(str(records.filename))
-        with writing(path, "give a folder that can be written, with enough room"):
-            records.flush()
-        self._index += [(m.tag, path.name, i, m.trial.scan, m.trial.scans) for i, m in enumerate(outcome.members)]
-        self._unfinished.discard(path)
+        path = self._folder.add(outcome.records, rows)
         return replace(outcome, records=None, file=path)  # an open file for every block would be too many
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._folder is not None:
-            for path in self._unfinished:
-                with contextlib.suppress(OSError):
-                    path.unlink()
-            if self._index or kind is None:
-                index = self._folder / INDEX
-                with writing(index, "give a folder that can be written"), index.open("w", newline="", encoding="utf-8") as file:
-                    csv.writer(file).writerows([_INDEX_HEADER, *self._index])
-        if self._parquet is not None:
-            self._parquet.close(finished=kind is None)
-
-
-class _Parquet:
-    """A Parquet file that grows by a row group per block, under another name until it is finished."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import pyarrow as pa
-            import pyarrow.parquet as pq
-        except ImportError:
-            raise FleetError(
-                "a Parquet file needs pyarrow, which is not installed; pip install 'pidemu[parquet]' brings it"
-            ) from None
-        self._pa: Any = pa
-        text, number, numbers = pa.string(), pa.float64(), pa.list_(pa.float64())
-        fields = [("tag", text), ("card", text), ("status", text), ("scan", number), *((name, number) for name in COLUMNS)]
-        fields += [("settled", pa.bool_()), ("stable", pa.bool_()), *((name, number) for name in MARGINS)]
-        self._schema = pa.schema([*fields, ("output", numbers), ("measurement", numbers)])
-        self._path, self._unfinished = path, path.with_name(f"{path.name}.unfinished")
-        if path.is_dir():
-            raise FleetError(f"{path} is a folder; give a file that can be written")
-        with writing(path, _OTHER_FILE):
-            self._writer: Any = pq.ParquetWriter(self._unfinished, self._schema)
-
-    def write(self, outcome: Outcome) -> None:
-        assert outcome.records is not None
-        lanes = [(i, m.trial.scans) for i, m in enumerate(outcome.members)]
-        judged = [judgement(outcome, i) for i, _ in lanes]
-        columns: dict[str, Any] = {
-            "tag": [m.tag for m in outcome.members],
-            "card": [m.trial.settings.card.id for m in outcome.members],
-            "status": [j.status for j in judged],
-            "scan": [m.trial.scan for m in outcome.members],
-            **outcome.columns,
-            "settled": [j.settled for j in judged],
-            "stable": [j.stable for j in judged],
-            **{name: [j.margins.get(name) for j in judged] for name in MARGINS},
-            "output": [outcome.records[0, :scans, i] for i, scans in lanes],
-            "measurement": [outcome.records[1, :scans, i] for i, scans in lanes],
-        }
-        with writing(self._path, _OTHER_FILE):
-            self._writer.write_table(self._pa.table(columns, schema=self._schema))
-
-    def close(self, *, finished: bool) -> None:
-        with writing(self._path, _OTHER_FILE):
-            try:
-                self._writer.close()
-                if finished:
-                    os.replace(self._unfinished, self._path)
-            finally:
-                self._unfinished.unlink(missing_ok=True)
+        over = kind is None or issubclass(kind, KeyboardInterrupt)  # what was done by then is whole
+        with contextlib.ExitStack() as both:  # whatever becomes of one of them, the other is closed
+            if self._parquet is not None:
+                both.callback(self._parquet.close, finished=over)
+            if self._folder is not None:
+                both.callback(self._folder.close, finished=over)

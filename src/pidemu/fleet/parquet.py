@@ -1,0 +1,160 @@
+"""A Parquet file of figures and signals: parts while the fleet runs, each of them whole, and one file when it is over."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pidemu.errors import FleetError
+from pidemu.files.writing import beside, check
+from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.finished import FIELDS, Finished, read_row
+from pidemu.fleet.judgement import MARGINS
+from pidemu.fleet.writing import writing
+
+_PART: Final = "part-{}.parquet"
+_SIGNALS: Final = ("output", "measurement")
+
+
+class ParquetFile:
+    """A Parquet file that takes a fleet block by block.
+
+    Each block is a file of the folder ``FILE.parts``, which appears when it is on the disk. When the run is over, or interrupted,
+    they become row groups of one file, with a row per loop: tag, card, `FIELDS`, and the lists ``output`` and ``measurement``.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    resume : bool
+        Go on with its rows and with the parts; else there must be no parts.
+
+    Attributes
+    ----------
+    listed : bool
+        Whether `found` found loops, of whatever fleet.
+
+    Raises
+    ------
+    FleetError
+        It cannot be written, there are parts of a run that did not end, or pyarrow is not installed.
+    """
+
+    def __init__(self, path: Path, resume: bool = False) -> None:
+        try:
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+        except ImportError:
+            raise FleetError(
+                "a Parquet file needs pyarrow, which is not installed; pip install 'pidemu[parquet]' brings it"
+            ) from None
+        self._pa, self._pq = pa, pq
+        self._schema: Any = _schema(pa)
+        self._path, self._parts = path, path.with_name(f"{path.name}.parts")
+        check(path, FleetError)
+        parts = sorted(self._parts.glob(_PART.format("*")))
+        if parts and not resume:
+            raise FleetError(
+                f"{self._parts} holds what a run had done that did not end; go on with it (--resume, resume=True), or remove it"
+            )
+        numbers = (part.stem.rpartition("-")[2] for part in parts)
+        self._numbers = itertools.count(1 + max((int(n) for n in numbers if n.isdecimal()), default=0))
+        self._there = [path, *parts] if resume else []
+        self._taken: list[tuple[Path, set[str]]] = []
+        self.listed = False
+
+    def __str__(self) -> str:
+        return str(self._path)
+
+    def found(self, wanted: Mapping[str, str]) -> dict[str, Finished]:
+        """Return what is complete here, by tag.
+
+        Parameters
+        ----------
+        wanted : mapping of str to str
+            Key by tag: what was run otherwise does not count.
+        """
+        kept: dict[str, Finished] = {}
+        self._taken = []
+        for path in self._there:
+            every = list(self._rows(path))
+            self.listed = self.listed or bool(every)
+            rows = {one.tag: one for one in every if wanted.get(one.tag) == one.key and one.tag not in kept}
+            self._taken.append((path, set(rows)))
+            kept |= rows
+        return kept
+
+    def _rows(self, path: Path) -> Iterator[Finished]:
+        """Yield the loops of a file; what is not a file of these is no part of it."""
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError), self._pq.ParquetFile(path) as file:  # Arrow's are such
+            if file.schema_arrow.equals(self._schema):
+                for row in file.read(["tag", *FIELDS]).to_pylist():
+                    yield read_row(row["tag"], row)
+
+    def begin(self, kept: Iterable[str]) -> None:
+        """Take the tags that go on to count, of those that `found` returned."""
+        tags = set(kept)
+        self._taken = [(path, own & tags) for path, own in self._taken]
+        with writing(self._parts, "give a file in a folder that can be written"):
+            self._parts.mkdir(exist_ok=True)
+
+    def add(self, outcome: Outcome, rows: Sequence[Finished]) -> None:
+        """Write a block.
+
+        Raises
+        ------
+        FleetError
+            It cannot be written.
+        """
+        assert outcome.records is not None
+        records = [one.row for one in rows]
+        columns: dict[str, Any] = {
+            "tag": [m.tag for m in outcome.members],
+            "card": [m.trial.settings.card.id for m in outcome.members],
+            **{name: [row[name] for row in records] for name in FIELDS},
+            **{
+                name: [outcome.records[k, : m.trial.scans, i] for i, m in enumerate(outcome.members)]
+                for k, name in enumerate(_SIGNALS)
+            },
+        }
+        part = self._parts / _PART.format(f"{next(self._numbers):05d}")
+        with beside(part, FleetError, binary=True) as stream:
+            self._pq.write_table(self._pa.table(columns, schema=self._schema), stream)
+        self._taken.append((part, {one.tag for one in rows}))
+
+    def close(self, *, finished: bool) -> None:
+        """Make one file of the parts where the run is over; else leave them to a run that goes on.
+
+        Raises
+        ------
+        FleetError
+            The file cannot be written; the parts are there.
+        """
+        if finished:
+            with beside(self._path, FleetError, binary=True) as stream, self._pq.ParquetWriter(stream, self._schema) as writer:
+                for path, tags in self._taken:
+                    if tags:
+                        self._copy(path, tags, writer)
+            shutil.rmtree(self._parts, ignore_errors=True)
+        else:
+            with contextlib.suppress(OSError):
+                self._parts.rmdir()  # where it is empty
+
+    def _copy(self, path: Path, tags: set[str], writer: Any) -> None:
+        with self._pq.ParquetFile(path) as file:
+            for group in range(file.num_row_groups):
+                table = file.read_row_group(group)
+                own = [tag in tags for tag in table["tag"].to_pylist()]
+                if any(own):
+                    writer.write_table(table if all(own) else table.filter(self._pa.array(own)))
+
+
+def _schema(pa: Any) -> Any:
+    numbers = pa.list_(pa.float64())
+    kinds = {**dict.fromkeys((*COLUMNS, *MARGINS, "scan"), pa.float64()), "scans": pa.int64()}
+    kinds |= {"settled": pa.bool_(), "stable": pa.bool_()} | dict.fromkeys(_SIGNALS, numbers)
+    return pa.schema([(name, kinds.get(name, pa.string())) for name in ("tag", "card", *FIELDS, *_SIGNALS)])
