@@ -87,22 +87,23 @@ def test_every_key_and_value_has_its_place() -> None:
 
 
 def test_a_duplicate_key_is_refused_with_both_lines() -> None:
-    assert placed("form: series\nscan: 1\nform: parallel\n") == [(3, 1, "duplicate key 'form' (first on line 1); keep one")]
+    text = "card: 1\nform: series\nscan: 1\nform: parallel\n"
+    assert placed(text) == [(4, 1, "duplicate key 'form' (first on line 2); keep one")]
 
 
 def test_each_further_duplicate_names_the_first_line() -> None:
-    assert placed("a: 1\na: 2\na: 3\n") == [
-        (2, 1, "duplicate key 'a' (first on line 1); keep one"),
-        (3, 1, "duplicate key 'a' (first on line 1); keep one"),
+    assert placed("card: 1\na: 1\na: 2\na: 3\n") == [
+        (3, 1, "duplicate key 'a' (first on line 2); keep one"),
+        (4, 1, "duplicate key 'a' (first on line 2); keep one"),
     ]
 
 
 def test_a_duplicate_in_a_nested_mapping_is_refused() -> None:
-    assert placed("a:\n  x: 1\n  x: 2\n") == [(3, 3, "duplicate key 'x' (first on line 2); keep one")]
+    assert placed("card: 1\na:\n  x: 1\n  x: 2\n") == [(4, 3, "duplicate key 'x' (first on line 3); keep one")]
 
 
 def test_aliases_are_refused() -> None:
-    assert placed("a: &one 1\nb: *one\n") == [(2, 4, "alias '*one' is not used in cards; write the value out")]
+    assert placed("card: 1\na: &one 1\nb: *one\n") == [(3, 4, "alias '*one' is not used in cards; write the value out")]
 
 
 @pytest.mark.parametrize("tag", ["!!python/object/apply:os.system", "!include", "!!float"])
@@ -199,7 +200,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 def test_an_error_shows_the_lines_around_and_marks_the_token() -> None:
     with pytest.raises(CardError) as caught:
-        parse("a: 1\nbc: 2\nbc: 3\nd: 4\n", "card.yaml")
+        parse("card: 1\nbc: 2\nbc: 3\nd: 4\n", "card.yaml")
     assert str(caught.value) == (
         "card.yaml:3:1: duplicate key 'bc' (first on line 2); keep one\n  2 | bc: 2\n  3 | bc: 3\n    | ^^\n  4 | d: 4"
     )

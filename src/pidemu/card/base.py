@@ -7,7 +7,7 @@ from datetime import date
 from enum import StrEnum
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 
@@ -25,6 +25,12 @@ def _day(value: Any) -> Any:
     return value
 
 
+def _line(value: str) -> str:
+    if "\n" in value or "\t" in value:
+        raise PydanticCustomError("one_line", "more than one line; a name is one line, without tabs")
+    return value
+
+
 class Model(BaseModel):
     """Base of every part of a card: frozen, and nothing but the documented keys."""
 
@@ -38,7 +44,12 @@ class Model(BaseModel):
     )
 
 
-Text = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, Field(min_length=1, max_length=10_000)]
+"""Sentences, in one line or several; `pidemu.card.source` lets nothing in that cannot be seen."""
+
+
+Name = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_line)]
+"""What a thing is called, or where it stands: one line."""
 
 
 Number = Annotated[
@@ -55,7 +66,7 @@ Day = Annotated[date, BeforeValidator(_day)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
-SettingName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+SettingName = Annotated[str, Field(max_length=64, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Form(StrEnum):
@@ -117,7 +128,7 @@ class Evidence(Model):
         description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
         "from something documented) or `assumed` (no source says so; shown wherever a result rests on it)."
     )
-    source: Text | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
+    source: Name | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
     at: Text | None = Field(
         default=None,
         description="Place in the source: page, section, function. Required for `documented` and `measured`.",
