@@ -44,6 +44,16 @@ _EU = ('unit: "%/%"', "unit: eu/eu")
 _NO_ALPHA: tuple[Edit, ...] = ((ALPHA, ""), (ALPHA_EVIDENCE, ""))
 
 STATEMENTS: tuple[Case, ...] = (
+    ("reject_unused_settings", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
+    (
+        "reject_unused_settings",
+        (
+            ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
+            *_NO_ALPHA,
+            ("kd: 32, Tf: 2}", "kd: 0}"),
+        ),
+        ("16:3: nothing uses 'RATE'",),
+    ),
     (
         "reject_wrong_folder",
         (("vendor: Nobody", "vendor: Some Body & Co."),),
@@ -244,7 +254,6 @@ EQUATIONS: tuple[Case, ...] = (
         (("ratio: ALPHA", "ratio: RATE"),),
         ("11:56: 'RATE' sets the derivative; here one that sets the filter-ratio is needed", "17:3: nothing uses 'ALPHA'"),
     ),
-    ("reject_bad_references", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
     (
         "reject_bad_references",
         ((WINDUP, "{scheme: back-calculation, tracking-time: TT}"),),
@@ -320,15 +329,6 @@ EQUATIONS: tuple[Case, ...] = (
         "reject_bad_references",
         added("cascade", "{proportional: {on: weighted, weight: BETA}}"),
         ("9:48: no setting 'BETA'",),
-    ),
-    (
-        "reject_bad_references",
-        (
-            ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
-            *_NO_ALPHA,
-            ("kd: 32, Tf: 2}", "kd: 0}"),
-        ),
-        ("16:3: nothing uses 'RATE'",),
     ),
     (
         "reject_bad_weights",

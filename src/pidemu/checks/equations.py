@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.base import Rule
-from pidemu.card.load import Variant, dotted, variants
+from pidemu.card.load import Variant, dotted
 from pidemu.card.models import Equation
-from pidemu.card.references import BY_ROLE, references
+from pidemu.card.references import references
 from pidemu.card.source import Path_
 from pidemu.card.terms import Derivative, Proportional
 from pidemu.checks import stages
@@ -167,7 +167,7 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_references(variant: Variant) -> Iterator[Problem]:
-    """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
+    """A field that names a setting names one with the right role, and a number in its place is one."""
     equation, document = variant.equation, variant.card.document
     for path, name, role in references(equation):
         if isinstance(name, float):
@@ -181,10 +181,6 @@ def reject_bad_references(variant: Variant) -> Iterator[Problem]:
             yield document.problem(variant.home(path), f"no setting '{name}'{suggest(name, equation.settings)}")
         elif setting.sets != role:
             yield document.problem(variant.home(path), f"'{name}' sets the {setting.sets}; here one that sets the {role} is needed")
-    used = {name for v in variants(variant.card) for name in _used(v.equation)}
-    for name in equation.settings:
-        if name not in used:
-            yield document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
 
 
 def _wrong_number(field: str, role: str, x: float) -> str | None:
@@ -194,13 +190,6 @@ def _wrong_number(field: str, role: str, x: float) -> str | None:
     if not 0 <= x < math.inf and role != "filter-factor":  # which has a rule of its own
         return f"{field} is {x:g}; it is a number from 0 up"
     return f"{field} is 0: nothing would ever move; give a number above 0" if x == 0 and role in _RATES else None
-
-
-def _used(equation: Equation) -> Iterator[object]:
-    """Yield the settings that an equation uses: by a field that names them, or by their role."""
-    yield from (name for _, name, _ in references(equation))
-    off = {"integral": equation.integral.on == "none", "derivative": equation.derivative.on == "none"}
-    yield from (n for n, s in equation.settings.items() if s.sets in BY_ROLE and not off.get(s.sets, False))
 
 
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
