@@ -222,9 +222,7 @@ def test_no_text_of_a_card_gets_out_of_a_comment(folder: Path) -> None:
     words = (card, "GAIN=2", "RESET=60")
     scans = signals(0, 100)
     told("code", *words, "--out", ".", "--name", "level")
-    assert "- assumed: transfer.start = bumpless ( * / } int x; / * ( * ? ?/ " in (folder / "level.py").read_text(
-        encoding="utf-8"
-    )
+    assert "- assumed: transfer.start = bumpless ( * / } int x; / * ( * ? ?/ " in (folder / "level.py").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     exec(compile((folder / "level.py").read_bytes(), "level.py", "exec"), names)  # bytes: a declared encoding would count
     assert run_scan_by_scan(names, scans) == [controller.scan(*s) for s in scans]

@@ -38,7 +38,9 @@ def test_no_text_ends_a_comment_or_begins_one_in_any_language(text: str) -> None
     assert len(found.splitlines()) == 1
 
 
-@pytest.mark.parametrize("text", [*HOSTILE, "coding: latin-1", "xcoding=nonsense", 'a"', '"' * 4, 'a\\"', r"\N{DEL} \x", "\ud800", ""])
+@pytest.mark.parametrize(
+    "text", [*HOSTILE, "coding: latin-1", "xcoding=nonsense", 'a"', '"' * 4, 'a\\"', r"\N{DEL} \x", "\ud800", ""]
+)
 def test_python_reads_nothing_but_a_docstring_and_no_encoding(text: str) -> None:
     """PEP 263: a comment such as ``coding: latin-1`` in the first two lines declares the encoding."""
     lines = python_head(text, [text, text])
