@@ -14,8 +14,8 @@ CONTROLS: Final = (
 BIDI: Final = ("\u200e", "\u200f", "\u202a", "\u202d", "\u202e", "\u2066", "\u2069", "\u200b", "\u00ad", "\ufeff")
 """What turns the direction of writing, or cannot be seen."""
 MARKS: Final = (
-    "*/", "/*", "//", "*", "/", "(*", "*)", "\\", "\\\n", "??/", "??/\n", "#", "\n#", '"', '"""', "'''", "'", "`", "{", "}", "${", "%s",
-    "\\N{DEL}", "\\x", "\\u", "\nimport os\nos.abort()\n", "\n#error\n", '");abort();("', "#include <none>", "]]>", "<!--", "-->",
+    "*/", "/*", "//", "*", "/", "(*", "*)", "\\", "\\\n", "??/", "??/\n", "#", "\n#", '"', '"""', "'''", "'", "`", "{", "}", "${",
+    "%s", "\\N{DEL}", "\\x", "\\u", "\nimport os\nos.abort()\n", "\n#error\n", '");abort();("', "#include <none>", "]]>", "<!--", "-->",
     "<script>", "=1+1", "@", "$x^2$",
 )  # fmt: skip
 """What means something in a language that texts are printed in."""

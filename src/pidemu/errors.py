@@ -63,6 +63,8 @@ class Problem:
         Length of the offending token, for the marks under it.
     source : tuple of str
         All lines of the file, for the excerpt; none where they are not to be shown.
+    stands_for : int
+        How many problems it counts for: more than one where it is the last of very many.
     """
 
     path: str
@@ -71,6 +73,7 @@ class Problem:
     message: str
     width: int = 1
     source: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    stands_for: int = field(default=1, compare=False)
 
     def __post_init__(self) -> None:
         for name, most in (("path", _LONGEST_PATH), ("message", _LONGEST_MESSAGE)):  # both hold text that is not ours
@@ -99,7 +102,8 @@ def capped(problems: Iterable[Problem]) -> list[Problem]:
     if len(found) <= MOST_PROBLEMS + 1:
         return found
     first, more = found[:MOST_PROBLEMS], found[MOST_PROBLEMS]
-    return [*first, replace(more, message=f"and {len(found) - MOST_PROBLEMS} more problems, from here on")]
+    count = sum(p.stands_for for p in found[MOST_PROBLEMS:])
+    return [*first, replace(more, message=f"and {count} more problems, from here on", stands_for=count)]
 
 
 class CardError(PidemuError):

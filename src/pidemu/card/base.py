@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from datetime import date
 from enum import StrEnum
@@ -10,6 +11,10 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+SMALLEST: Final = 1e-40
+LARGEST: Final = 1e40
+"""Sizes between which finite numbers of cards lie, other than 0: those of float32 do, and all of engineering."""
+
 
 def _hyphen(name: str) -> str:
     return name.rstrip("_").replace("_", "-")
@@ -17,6 +22,14 @@ def _hyphen(name: str) -> str:
 
 def _infinity(value: Any) -> Any:
     return float(value) if value in ("inf", "-inf") else value
+
+
+def _plausible(value: float) -> float:
+    if math.isnan(value):
+        raise PydanticCustomError("not_a_number", "nan is not a number; give one")
+    if value and math.isfinite(value) and not SMALLEST <= abs(value) <= LARGEST:
+        raise PydanticCustomError("implausible", "{value} is not a plausible number", {"value": f"{value:g}"})
+    return value
 
 
 def _day(value: Any) -> Any:
@@ -56,6 +69,7 @@ Number = Annotated[
     float,
     Field(strict=True),
     BeforeValidator(_infinity),
+    AfterValidator(_plausible),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
 ]
 

@@ -15,6 +15,7 @@ from pidemu.excerpt import shortened
 
 _LONGEST: Final = 60
 """Characters of a value that are shown."""
+_OF_NUMBERS: Final = ("not_a_number", "implausible")
 Locate = Callable[[Path_], Path_]
 """From a path in the value that was validated to the path in the file."""
 
@@ -93,7 +94,7 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
             return _wrong_length(most, len(value), most if context.get("field_type") == "Tuple" else 1)
         case "greater_than":
             return f"{shown} is not above {'zero' if context['gt'] == 0 else context['gt']}"
-        case "one_line":
+        case "one_line" | "two_names" | "not_a_number" | "implausible":
             return str(error["msg"])
         case "string_too_long":
             return f"{len(value)} characters, at most {context['max_length']} are allowed"
@@ -147,6 +148,7 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         Maps a path in `value` to its path in the file.
     """
     found: dict[tuple[Path_, bool], list[str]] = {}
+    of_numbers: dict[tuple[Path_, bool], str] = {}
     for detail in error.errors(include_url=False):
         path, here = _walk(value, detail["loc"])
         of_key = detail["loc"][-1] == "[key]"
@@ -155,6 +157,8 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         scheme = _walk(value, (*path[:-1], "scheme"))[1] if path and detail["type"] == "extra_forbidden" else None
         message = _message(detail, path, path[-1] if of_key else here, model, scheme if isinstance(scheme, str) else None)
         messages = found.setdefault((path, at_key), [])
+        if detail["type"] in _OF_NUMBERS:  # that no text may stand there either is beside the point
+            of_numbers[path, at_key] = message
         if message not in messages:
             messages.append(message)
     above = {inner[:n] for inner, _ in found for n in range(len(inner))}
@@ -162,7 +166,7 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         if path in above and not at_key:
             continue  # one branch of a union dislikes the whole, another says which part
         missing = [m for m in messages if m.startswith("missing")]
-        for message in missing or [_united(messages)]:
+        for message in missing or [of_numbers.get((path, at_key)) or _united(messages)]:
             key = (message.split("'")[1],) if missing else ()
             yield document.problem(locate((*path, *key)), message, at_key=at_key)
 

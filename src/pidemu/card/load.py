@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from pidemu.card.base import Evidence, Status
 from pidemu.card.faults import problems
 from pidemu.card.models import CardFile, Equation, Setting
+from pidemu.card.references import named_settings
 from pidemu.card.source import Document, Path_, parse_file
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import is_hidden
@@ -309,7 +310,9 @@ class Card:
         raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
         if isinstance(raw.get("settings"), dict):  # dials that choices add stand in their usual place, not at the end
             raw["settings"] = dict(sorted(raw["settings"].items(), key=_usual_place))
-        return Variant(self, chosen, _equation(raw, self.document, chosen), raw)
+        variant = Variant(self, chosen, _equation(raw, self.document, chosen), raw)
+        _refuse_wrong_references(variant)
+        return variant
 
     def settings(self, given: Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Return settings of this card.
@@ -372,6 +375,21 @@ def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]
         return Equation.model_validate(raw)
     except ValidationError as error:
         raise CardError(capped(problems(error, raw, Equation, document, locate))) from None
+
+
+def _refuse_wrong_references(variant: Variant) -> None:
+    """Refuse an equation that names a setting which is not there, or sets something else: nothing could be computed with it."""
+    settings, document = variant.equation.settings, variant.card.document
+    found = []
+    for path, name, role in named_settings(variant.equation):
+        setting = settings.get(name)
+        if setting is None:
+            found.append(document.problem(variant.home(path), f"no setting '{name}'{suggest(name, settings)}"))
+        elif setting.sets != role:
+            message = f"'{name}' sets the {setting.sets}; here one that sets the {role} is needed"
+            found.append(document.problem(variant.home(path), message))
+    if found:
+        raise CardError(capped(found))
 
 
 def card_from(document: Document, card_id: str) -> Card:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
 from pidemu.card.base import Flag, Model, Name, Number, Reference
 
@@ -121,6 +122,12 @@ class ActionExample(Model):
     output: Literal["rises", "falls"] = Field(description="Which way the output moves.")
 
 
+def _both(names: dict[str, str]) -> dict[str, str]:
+    if len(names) < 2:
+        raise PydanticCustomError("two_names", "names needs both 'reverse' and 'direct'")
+    return names
+
+
 class Action(Model):
     """Control action."""
 
@@ -136,7 +143,7 @@ class Action(Model):
         "vendor writes the direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all "
         "the same.",
     )
-    names: dict[Literal["reverse", "direct"], Name] = Field(
+    names: Annotated[dict[Literal["reverse", "direct"], Name], AfterValidator(_both)] = Field(
         description="The vendor's words for reverse acting (output falls when the measurement rises) and direct acting."
     )
     example: ActionExample = Field(description="One scan that shows the meaning of the words; a test runs it.")
