@@ -15,7 +15,8 @@ BIDI: Final = ("\u200e", "\u200f", "\u202a", "\u202d", "\u202e", "\u2066", "\u20
 """What turns the direction of writing, or cannot be seen."""
 MARKS: Final = (
     "*/", "/*", "//", "*", "/", "(*", "*)", "\\", "\\\n", "??/", "??/\n", "#", "\n#", '"', '"""', "'''", "'", "`", "{", "}", "${",
-    "%s", "\\N{DEL}", "\\x", "\\u", "\nimport os\nos.abort()\n", "\n#error\n", '");abort();("', "#include <none>", "]]>", "<!--", "-->",
+    "%s", "\\N{DEL}", "\\x", "\\u", "\nimport os\nos.abort()\n", "\n#error\n", '");abort();("', "#include <none>",
+    "]]>", "<!--", "-->",
     "<script>", "=1+1", "@", "$x^2$",
 )  # fmt: skip
 """What means something in a language that texts are printed in."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -23,28 +22,27 @@ def command(paths: tuple[str, ...], vendors: tuple[str, ...], as_json: bool) -> 
 
     Every fault is printed with its file, line and column. Exit status 1 if there is one.
     """
-    files = [f for p in paths for f in _files(Path(p))] if paths else _known(vendors)
-    problems: list[Problem] = []
-    for file in files:
-        reason = unusable(file)
-        problems += check_file(file, shown=_shown(file)) if reason is None else [Problem(_shown(file), 1, 1, reason)]
+    files = [f for p in paths for f in _files(Path(p))] if paths else list(card_files(vendors).values())
+    unread = [] if paths else unusable_files(vendors)
+    problems = [*unread, *(problem for file in files for problem in _checked(file))]
     if as_json:
         print_json([{"path": p.path, "line": p.line, "column": p.column, "message": p.message} for p in problems])
     else:
         for problem in problems:
             click.echo(problem.render(), err=True)
-        count = sum(problem.stands_for for problem in problems)
-        click.echo(f"{len(files)} card{'' if len(files) == 1 else 's'}, {count} problem{'' if count == 1 else 's'}")
+        cards, count = len(files) + len(unread), sum(problem.stands_for for problem in problems)
+        click.echo(f"{cards} card{'' if cards == 1 else 's'}, {count} problem{'' if count == 1 else 's'}")
     if problems:
         raise SystemExit(1)
 
 
-def _known(vendors: Sequence[str]) -> list[Path]:
-    return [*card_files(vendors).values(), *(Path(problem.path) for problem in unusable_files(vendors))]
+def _checked(file: Path) -> list[Problem]:
+    reason = unusable(file)
+    return check_file(file, shown=_shown(file)) if reason is None else [Problem(_shown(file), 1, 1, reason)]
 
 
 def _files(path: Path) -> list[Path]:
-    if not path.is_dir():
+    if not os.path.isdir(path):  # pathlib's raises where the path cannot be looked at
         if not os.path.lexists(path):
             raise CardNotFoundError(f"no file or folder '{path}'")
         return [path]
@@ -58,6 +56,6 @@ def _files(path: Path) -> list[Path]:
 
 def _shown(file: Path) -> str:
     try:
-        return Path(os.path.realpath(file)).relative_to(Path.cwd()).as_posix()
+        return file.absolute().relative_to(Path.cwd()).as_posix()
     except ValueError:
         return str(file)
