@@ -11,7 +11,7 @@ from typing import Any, Final
 from pidemu.card.library import card_files
 from pidemu.card.source import Path_, parse
 
-ABSURD: Final = (
+ABSURD: Final[tuple[Any, ...]] = (
     0, -1, 1, 2, 1e300, -1e300, 1e-300, 5e-324, math.inf, -math.inf, math.nan, 10**298, "9" * 5000, "", " ", "x" * 5000, "\0",
     "\x1b[2J", "\u202e", "a\nb", "0 s", "1e300 h", "1e-300 ms", "nan s", "-1 s", "inf", "none", None, True, False, [], {}, [0, 0],
     [1, 0], {"on": "none"}, [math.nan, math.nan], [-math.inf, math.inf],

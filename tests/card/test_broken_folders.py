@@ -15,7 +15,7 @@ from pidemu.errors import CardError, CardNotFoundError
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said
 
-_POSIX = pytest.mark.skipif(os.name != "posix", reason="pipes, links and names of bytes are those of POSIX")
+_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere not every name of bytes is that of a file")
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ _REASONS = {
 }
 
 
-@_POSIX
+@_LINUX
 def test_what_cannot_be_a_card_is_named_with_its_reason(folder: Path) -> None:
     assert sorted(_REASONS.items()) == sorted((p.path, p.message) for p in unusable_files(["."]))
     assert [i for i in card_files(["."]) if i.startswith("nobody/")] == [
@@ -59,7 +59,7 @@ def test_what_cannot_be_a_card_is_named_with_its_reason(folder: Path) -> None:
     ]
 
 
-@_POSIX
+@_LINUX
 def test_cards_lists_the_others_and_names_each_that_failed(folder: Path) -> None:
     status, out, err = said("cards", "--vendors", ".")
     assert (status, len(out.splitlines())) == (1, 2 + len(pidemu.cards()))
@@ -70,7 +70,7 @@ def test_cards_lists_the_others_and_names_each_that_failed(folder: Path) -> None
     assert "\x1b" not in err
 
 
-@_POSIX
+@_LINUX
 @pytest.mark.parametrize("words", [("check", "--vendors", "."), ("check", ".")], ids=" ".join)
 def test_check_goes_on_and_names_each_that_failed(folder: Path, words: tuple[str, ...]) -> None:
     status, out, err = said(*words)
@@ -83,7 +83,7 @@ def test_check_goes_on_and_names_each_that_failed(folder: Path, words: tuple[str
     assert max(map(len, err.splitlines())) < 300
 
 
-@_POSIX
+@_LINUX
 def test_an_error_shows_nothing_of_a_file_that_is_no_card(folder: Path) -> None:
     for words in (("check", "nobody/secret.yaml"), ("show", "nobody/secret", "--vendors", "."), ("cards", "--vendors", ".")):
         status, out, err = said(*words)
@@ -92,7 +92,7 @@ def test_an_error_shows_nothing_of_a_file_that_is_no_card(folder: Path) -> None:
         assert [w for w in ("root", "$6$", "hunter2", "hunter3", "key:") if w in out + err] == []
 
 
-@_POSIX
+@_LINUX
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
@@ -108,12 +108,12 @@ def test_loading_one_that_failed_says_why(folder: Path, name: str, reason: str) 
     assert reason == str(caught.value)
 
 
-@_POSIX
+@_LINUX
 def test_a_card_beside_broken_ones_is_loaded(folder: Path) -> None:
     assert pidemu.load_card("nobody/bench", ["."]).id == "nobody/bench"
 
 
-@_POSIX
+@_LINUX
 @pytest.mark.parametrize("name", ["ring", "nobody/bench.yaml", "/nowhere"])
 def test_a_folder_of_cards_that_is_none_is_refused(folder: Path, name: str) -> None:
     with pytest.raises(CardNotFoundError, match="no folder"):
@@ -129,14 +129,14 @@ def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
     str(caught.value).encode()
 
 
-@_POSIX
-@pytest.mark.skipif(os.name == "posix" and os.geteuid() == 0, reason="root may read everything")
+@_LINUX
+@pytest.mark.skipif(sys.platform != "win32" and os.geteuid() == 0, reason="root may read everything")
 def test_a_folder_that_may_not_be_read_is_named(folder: Path) -> None:
     (folder / "closed").mkdir(mode=0)
     assert "closed:1:1: cannot be read: Permission denied" in said("cards", "--vendors", ".").err
 
 
-@_POSIX
+@_LINUX
 def test_no_command_waits_for_a_pipe(folder: Path) -> None:
     pipe, here = str(folder / "nobody" / "pipe.yaml"), builtin_folder().parent
     for word in ("show", "check", "code"):
