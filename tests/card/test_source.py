@@ -344,3 +344,48 @@ def test_a_pair_that_is_no_pair_is_a_located_problem(key: str, value: str) -> No
 
 def test_every_built_in_card_is_among_those_damaged() -> None:
     assert len(pidemu.cards()) == len(REAL_CARDS) > 0
+
+
+@pytest.mark.parametrize(
+    ("beginning", "is_shown"),
+    [
+        ("card: 1\n", True),
+        ("# yaml-language-server: x\n\n---\ncard: 1 # version\n", True),
+        ("card: fisher/provox\n", True),  # a loop
+        ('{"card": 1,\n"a": 1}\n', True),
+        ("card:x:1000:1000::/home/card:/bin/sh\n", False),
+        ("vendor: Nobody\n", False),
+        ("password: hunter2\n", False),
+        ("discard: 1\n", False),
+    ],
+)
+def test_an_error_shows_lines_of_what_begins_like_a_card_only(beginning: str, is_shown: bool) -> None:
+    (first, *_) = problems_of(f"{beginning}a: \x01\n")
+    assert is_shown == bool(first.source)
+    assert is_shown == ("\n" in first.render())
+
+
+@pytest.mark.parametrize("text", ["root: 1\nroot: 2\n", "a: !root 1\n", "a: &root 1\nb: *root\n"])
+def test_an_error_names_nothing_of_a_file_that_is_no_card(text: str) -> None:
+    assert [p.headline() for p in problems_of(text) if "root" in p.headline()] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n" * 999_000,
+        "#\n" * 490_000,
+        "'" * 990_000,
+        "card: 1\n" + "x: 1\n" * 190_000,
+        "card: 1\na: x\n" + " y\n" * 300_000,
+        "card: 1\na: " + "\U0001f600" * 490_000,
+        "card: 1\n" + "".join(f"k{i}: 1\n" for i in range(20_000)),
+    ],
+    ids=["lines", "comments", "quotes", "duplicates", "words", "pictures", "keys"],
+)
+def test_the_work_for_a_text_grows_no_faster_than_the_text(text: str) -> None:
+    """The most that is read has at most 4,000 keys and values, and an error is of limited length."""
+    answer = answered(text)
+    if isinstance(answer, CardError):
+        assert len(str(answer)) < 50_000
+        assert len(answer.problems) <= 51

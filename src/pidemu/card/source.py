@@ -31,6 +31,8 @@ _FIRST: Final = re.compile(
     r"(?:[ \t]*(?:#.*|---)?\r?\n)*(?:card:[ \t]+\S{1,200}[ \t]*(?:#.*)?\r?$|[ \t]*\{\s*[\"']?card[\"']?:)", re.MULTILINE
 )
 """How a card begins, and a loop that names one."""
+_BEGINNING: Final = 20_000
+"""Characters within which it does, behind comments."""
 
 _INT: Final = re.compile(r"[-+]?[0-9]+$")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
@@ -140,6 +142,8 @@ class _Reader:
 
     def refuse_hidden(self, event: Any, allowed: str) -> None:
         """Refuse what is not seen as itself, or is obeyed by terminals: escape sequences, what turns the direction of writing."""
+        if event.value.isprintable():
+            return
         found = next((c for c in event.value if c not in allowed and is_hidden(c)), None)
         if found is not None:
             where = "a key" if not allowed else "a text"
@@ -218,7 +222,7 @@ def parse(text: str, path: str) -> Document:
         The text is not YAML, is empty, or uses what cards do not: every problem found, with its place.
     """
     digest = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
-    document = Document(path, tuple(text.splitlines()), digest=digest, is_card=_FIRST.match(text) is not None)
+    document = Document(path, tuple(text.splitlines()), digest=digest, is_card=_FIRST.match(text, 0, _BEGINNING) is not None)
     if len(text) > _MOST_CHARACTERS:
         message = f"{len(text):,} characters; a card has at most {_MOST_CHARACTERS:,}"
         raise CardError([Problem(path, 1, 1, message, 1, document.shown)])
