@@ -23,12 +23,24 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from pidemu.excerpt import excerpt, shortened, visible
 
 if TYPE_CHECKING:
     from pidemu.conversion.questions import Question
     from pidemu.conversion.result import Conversion
+
+
+MOST_PROBLEMS: Final = 50
+"""Problems of one file that are told one by one."""
+_LONGEST_PATH: Final = 400
+_LONGEST_MESSAGE: Final = 1000
+_LONGEST_WORD: Final = 60
+"""A longer word is not a misspelt name."""
+_MOST_KNOWN: Final = 1000
+"""Names that are compared with a word, letter by letter."""
 
 
 class PidemuError(Exception):
@@ -50,7 +62,9 @@ class Problem:
     width : int
         Length of the offending token, for the marks under it.
     source : tuple of str
-        All lines of the file, for the excerpt.
+        All lines of the file, for the excerpt; none where they are not to be shown.
+    stands_for : int
+        How many problems it counts for: more than one where it is the last of very many.
     """
 
     path: str
@@ -58,7 +72,12 @@ class Problem:
     column: int
     message: str
     width: int = 1
-    source: tuple[str, ...] = ()
+    source: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    stands_for: int = field(default=1, compare=False)
+
+    def __post_init__(self) -> None:
+        for name, most in (("path", _LONGEST_PATH), ("message", _LONGEST_MESSAGE)):  # both hold text that is not ours
+            object.__setattr__(self, name, visible(shortened(getattr(self, name), most)))
 
     def headline(self) -> str:
         """Return ``path:line:column: message``."""
@@ -68,13 +87,23 @@ class Problem:
         """Return the headline with the lines around and marks under the token, as a compiler prints it."""
         if not 1 <= self.line <= len(self.source):
             return self.headline()
-        gutter = len(str(self.line + 1)) + 2
-        out = [self.headline()]
-        for number in range(max(1, self.line - 1), min(len(self.source), self.line + 1) + 1):
-            out.append(f"{number:>{gutter}} | {self.source[number - 1]}".rstrip())
-            if number == self.line:
-                out.append(" " * gutter + " | " + " " * (self.column - 1) + "^" * max(1, self.width))
-        return "\n".join(out)
+        return "\n".join([self.headline(), *excerpt(self.source, self.line, self.column, self.width)])
+
+
+def capped(problems: Iterable[Problem]) -> list[Problem]:
+    """Return problems in the order of the file; of very many the first, and how many more there are.
+
+    Parameters
+    ----------
+    problems : iterable of Problem
+        All of them; those that are alike count once.
+    """
+    found = sorted(set(problems))
+    if len(found) <= MOST_PROBLEMS + 1:
+        return found
+    first, more = found[:MOST_PROBLEMS], found[MOST_PROBLEMS]
+    count = sum(p.stands_for for p in found[MOST_PROBLEMS:])
+    return [*first, replace(more, message=f"and {count} more problems, from here on", stands_for=count)]
 
 
 class CardError(PidemuError):
@@ -193,9 +222,11 @@ def suggest(word: str, known: Iterable[str]) -> str:
     known : iterable of str
         What could have been written.
     """
+    if len(word) > _LONGEST_WORD:
+        return ""
     known = list(known)
     folded = {k.casefold(): k for k in known}
     if word.casefold() in folded:
         return f" (did you mean '{folded[word.casefold()]}'?)"
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(word, known[:_MOST_KNOWN], n=1, cutoff=0.6)
     return f" (did you mean '{near[0]}'?)" if near else ""

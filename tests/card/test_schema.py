@@ -121,7 +121,7 @@ def test_the_schema_refuses_what_the_loader_refuses(path: tuple[str, ...], value
         (WINDUP, {"scheme": "conditional", "last-increment": "dropped"}),
         (WINDUP, {"scheme": "freeze", "judged-on": "sum", "direction": "both"}),
         (WINDUP, {"scheme": "back-calculation", "tracking-time": 0.5, "times": "Ti", "implicit": True}),
-        (("integral", "limits"), {"low": "output", "high": "GAIN"}),
+        (("integral", "limits"), {"low": "output", "high": 5}),
         (("integral", "limits"), {"low": "-inf", "high": 3}),
         (("derivative", "rule"), "four-point"),
         (("measurement",), {"filter": {"factor": 0.5}, "previous-scan": True}),

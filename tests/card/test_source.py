@@ -87,22 +87,23 @@ def test_every_key_and_value_has_its_place() -> None:
 
 
 def test_a_duplicate_key_is_refused_with_both_lines() -> None:
-    assert placed("form: series\nscan: 1\nform: parallel\n") == [(3, 1, "duplicate key 'form' (first on line 1); keep one")]
+    text = "card: 1\nform: series\nscan: 1\nform: parallel\n"
+    assert placed(text) == [(4, 1, "duplicate key 'form' (first on line 2); keep one")]
 
 
 def test_each_further_duplicate_names_the_first_line() -> None:
-    assert placed("a: 1\na: 2\na: 3\n") == [
-        (2, 1, "duplicate key 'a' (first on line 1); keep one"),
-        (3, 1, "duplicate key 'a' (first on line 1); keep one"),
+    assert placed("card: 1\na: 1\na: 2\na: 3\n") == [
+        (3, 1, "duplicate key 'a' (first on line 2); keep one"),
+        (4, 1, "duplicate key 'a' (first on line 2); keep one"),
     ]
 
 
 def test_a_duplicate_in_a_nested_mapping_is_refused() -> None:
-    assert placed("a:\n  x: 1\n  x: 2\n") == [(3, 3, "duplicate key 'x' (first on line 2); keep one")]
+    assert placed("card: 1\na:\n  x: 1\n  x: 2\n") == [(4, 3, "duplicate key 'x' (first on line 3); keep one")]
 
 
 def test_aliases_are_refused() -> None:
-    assert placed("a: &one 1\nb: *one\n") == [(2, 4, "alias '*one' is not used in cards; write the value out")]
+    assert placed("card: 1\na: &one 1\nb: *one\n") == [(3, 4, "alias '*one' is not used in cards; write the value out")]
 
 
 @pytest.mark.parametrize("tag", ["!!python/object/apply:os.system", "!include", "!!float"])
@@ -199,7 +200,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 def test_an_error_shows_the_lines_around_and_marks_the_token() -> None:
     with pytest.raises(CardError) as caught:
-        parse("a: 1\nbc: 2\nbc: 3\nd: 4\n", "card.yaml")
+        parse("card: 1\nbc: 2\nbc: 3\nd: 4\n", "card.yaml")
     assert str(caught.value) == (
         "card.yaml:3:1: duplicate key 'bc' (first on line 2); keep one\n  2 | bc: 2\n  3 | bc: 3\n    | ^^\n  4 | d: 4"
     )
@@ -343,3 +344,48 @@ def test_a_pair_that_is_no_pair_is_a_located_problem(key: str, value: str) -> No
 
 def test_every_built_in_card_is_among_those_damaged() -> None:
     assert len(pidemu.cards()) == len(REAL_CARDS) > 0
+
+
+@pytest.mark.parametrize(
+    ("beginning", "is_shown"),
+    [
+        ("card: 1\n", True),
+        ("# yaml-language-server: x\n\n---\ncard: 1 # version\n", True),
+        ("card: fisher/provox\n", True),  # a loop
+        ('{"card": 1,\n"a": 1}\n', True),
+        ("card:x:1000:1000::/home/card:/bin/sh\n", False),
+        ("vendor: Nobody\n", False),
+        ("password: hunter2\n", False),
+        ("discard: 1\n", False),
+    ],
+)
+def test_an_error_shows_lines_of_what_begins_like_a_card_only(beginning: str, is_shown: bool) -> None:
+    (first, *_) = problems_of(f"{beginning}a: \x01\n")
+    assert is_shown == bool(first.source)
+    assert is_shown == ("\n" in first.render())
+
+
+@pytest.mark.parametrize("text", ["root: 1\nroot: 2\n", "a: !root 1\n", "a: &root 1\nb: *root\n"])
+def test_an_error_names_nothing_of_a_file_that_is_no_card(text: str) -> None:
+    assert [p.headline() for p in problems_of(text) if "root" in p.headline()] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n" * 999_000,
+        "#\n" * 490_000,
+        "'" * 990_000,
+        "card: 1\n" + "x: 1\n" * 190_000,
+        "card: 1\na: x\n" + " y\n" * 300_000,
+        "card: 1\na: " + "\U0001f600" * 490_000,
+        "card: 1\n" + "".join(f"k{i}: 1\n" for i in range(20_000)),
+    ],
+    ids=["lines", "comments", "quotes", "duplicates", "words", "pictures", "keys"],
+)
+def test_the_work_for_a_text_grows_no_faster_than_the_text(text: str) -> None:
+    """The most that is read has at most 4,000 keys and values, and an error is of limited length."""
+    answer = answered(text)
+    if isinstance(answer, CardError):
+        assert len(str(answer)) < 50_000
+        assert len(answer.problems) <= 51

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from pidemu.checks import equations, runs, stages, statements
-from pidemu.errors import Problem
+from pidemu.errors import CardError, Problem
 from tests.checks.bench import (
     ALPHA,
     ALPHA_EVIDENCE,
@@ -44,6 +44,16 @@ _EU = ('unit: "%/%"', "unit: eu/eu")
 _NO_ALPHA: tuple[Edit, ...] = ((ALPHA, ""), (ALPHA_EVIDENCE, ""))
 
 STATEMENTS: tuple[Case, ...] = (
+    ("reject_unused_settings", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
+    (
+        "reject_unused_settings",
+        (
+            ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
+            *_NO_ALPHA,
+            ("kd: 32, Tf: 2}", "kd: 0}"),
+        ),
+        ("16:3: nothing uses 'RATE'",),
+    ),
     (
         "reject_wrong_folder",
         (("vendor: Nobody", "vendor: Some Body & Co."),),
@@ -192,7 +202,6 @@ EQUATIONS: tuple[Case, ...] = (
     ),
     ("reject_bad_numbers", (("[0.05, 1]", "[1, 0.05]"),), ("17:49: range 1 to 0.05 does not ascend",)),
     ("reject_bad_numbers", (("default: 0.125", "default: 2"),), ("17:69: default 2 is outside 0.05 to 1 and is not an off value",)),
-    ("reject_bad_numbers", (("default: 0.125", "default: .nan"),), ("17:69: default is not a number",)),
     ("reject_bad_numbers", (("[0, 100]", "[100, 0]"),), ("28:18: output limits 100 to 0 do not ascend",)),
     (
         "reject_bad_numbers",
@@ -235,27 +244,6 @@ EQUATIONS: tuple[Case, ...] = (
     ),
     ("reject_missing_dials", ((CHOICE, "{settings: {RESET: null}}"),), ("23:14: no setting sets the integral",)),
     (
-        "reject_bad_references",
-        (("ratio: ALPHA", "ratio: ALFA"),),
-        ("11:56: no setting 'ALFA' (did you mean 'ALPHA'?)", "17:3: nothing uses 'ALPHA'"),
-    ),
-    (
-        "reject_bad_references",
-        (("ratio: ALPHA", "ratio: RATE"),),
-        ("11:56: 'RATE' sets the derivative; here one that sets the filter-ratio is needed", "17:3: nothing uses 'ALPHA'"),
-    ),
-    ("reject_bad_references", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
-    (
-        "reject_bad_references",
-        ((WINDUP, "{scheme: back-calculation, tracking-time: TT}"),),
-        ("10:89: no setting 'TT'",),
-    ),
-    (
-        "reject_bad_references",
-        ((CHOICE, "{proportional: {on: weighted, weight: BETA}}"),),
-        ("23:51: no setting 'BETA'",),
-    ),
-    (
         "reject_missing_dials",
         (("GAIN: {sets: gain,", "GAIN: {sets: process-gain,"),),
         (
@@ -276,59 +264,16 @@ EQUATIONS: tuple[Case, ...] = (
         ((ALPHA, ALPHA + '  K: {sets: multiplier, unit: "1", default: 1}\n  K2: {sets: multiplier, unit: "1", default: 1}\n'),),
         ("19:3: 'K' and 'K2' both set the multiplier",),
     ),
+    ("reject_bad_constants", added("setpoint", "{filter: {time: -3}}"), ("9:27: time is -3; it is a number from 0 up",)),
     (
-        "reject_bad_references",
-        ((WINDUP, "{scheme: none}, limits: {high: IMAX}"), (ALPHA, ALPHA + "  IMAX: {sets: deadband, unit: '%'}\n")),
-        ("10:78: 'IMAX' sets the deadband; here one that sets the integral-limit is needed",),
-    ),
-    (
-        "reject_bad_references",
-        added("measurement", "{filter: {time: TPV}}"),
-        ("9:30: no setting 'TPV'",),
-    ),
-    ("reject_bad_references", added("setpoint", "{filter: {time: -3}}"), ("9:27: time is -3; it is a number from 0 up",)),
-    (
-        "reject_bad_references",
+        "reject_bad_constants",
         added("setpoint", "{rate: 0}"),
         ("9:18: rate is 0: nothing would ever move; give a number above 0",),
     ),
     (
-        "reject_bad_references",
-        ((WINDUP, "{scheme: none}, limits: {low: .nan, high: output}"),),
-        ("10:77: low is nan; it is a number",),
-    ),
-    (
-        "reject_bad_references",
+        "reject_bad_constants",
         added("error", "{shape: gap, band: -1, gain: -0.5}"),
         ("9:27: band is -1; it is a number from 0 up", "9:37: gain is -0.5; it is a number from 0 up"),
-    ),
-    (
-        "reject_bad_references",
-        (("output: {limits: [0, 100]}", "output: {limits: [0, 100], rate: OUT_RATE, deadband: GAIN, resolution: STEP}"),),
-        (
-            "28:34: no setting 'OUT_RATE' (did you mean 'RATE'?)",
-            "28:54: 'GAIN' sets the gain; here one that sets the deadband is needed",
-            "28:72: no setting 'STEP'",
-        ),
-    ),
-    (
-        "reject_bad_references",
-        added("feedforward", "{summed: before-limits, gain: KFF}"),
-        ("9:44: no setting 'KFF'",),
-    ),
-    (
-        "reject_bad_references",
-        added("cascade", "{proportional: {on: weighted, weight: BETA}}"),
-        ("9:48: no setting 'BETA'",),
-    ),
-    (
-        "reject_bad_references",
-        (
-            ("derivative: {on: pv, filter: {applies-to: term, ratio: ALPHA}}", "derivative: {on: none}"),
-            *_NO_ALPHA,
-            ("kd: 32, Tf: 2}", "kd: 0}"),
-        ),
-        ("16:3: nothing uses 'RATE'",),
     ),
     (
         "reject_bad_weights",
@@ -430,11 +375,6 @@ EQUATIONS: tuple[Case, ...] = (
     ),
     (
         "reject_wrong_action",
-        ((", direct: Direct", ""),),
-        ("25:3: names needs both 'reverse' and 'direct'",),
-    ),
-    (
-        "reject_wrong_action",
         (("direct: Direct", "direct: Auto"), ("reverse: Reverse", "reverse: Auto"), ("name: Reverse", "name: Auto")),
         ("25:3: reverse and direct have the same name 'Auto'",),
     ),
@@ -529,6 +469,50 @@ RUNS: tuple[Case, ...] = (
         (f"19:3: with STRUCTURE=I-PD: {_ZERO_GAIN}", f"19:3: with STRUCTURE=PID: {_ZERO_GAIN}"),
     ),
 )
+
+REFERENCES: tuple[tuple[tuple[Edit, ...], tuple[str, ...]], ...] = (
+    (
+        (("ratio: ALPHA", "ratio: ALFA"),),
+        ("11:56: no setting 'ALFA' (did you mean 'ALPHA'?)",),
+    ),
+    (
+        (("ratio: ALPHA", "ratio: RATE"),),
+        ("11:56: 'RATE' sets the derivative; here one that sets the filter-ratio is needed",),
+    ),
+    (
+        ((WINDUP, "{scheme: back-calculation, tracking-time: TT}"),),
+        ("10:89: no setting 'TT'",),
+    ),
+    (
+        ((CHOICE, "{proportional: {on: weighted, weight: BETA}}"),),
+        ("23:51: no setting 'BETA'",),
+    ),
+    (
+        ((WINDUP, "{scheme: none}, limits: {high: IMAX}"), (ALPHA, ALPHA + "  IMAX: {sets: deadband, unit: '%'}\n")),
+        ("10:78: 'IMAX' sets the deadband; here one that sets the integral-limit is needed",),
+    ),
+    (
+        added("measurement", "{filter: {time: TPV}}"),
+        ("9:30: no setting 'TPV'",),
+    ),
+    (
+        (("output: {limits: [0, 100]}", "output: {limits: [0, 100], rate: OUT_RATE, deadband: GAIN, resolution: STEP}"),),
+        (
+            "28:34: no setting 'OUT_RATE' (did you mean 'RATE'?)",
+            "28:54: 'GAIN' sets the gain; here one that sets the deadband is needed",
+            "28:72: no setting 'STEP'",
+        ),
+    ),
+    (
+        added("feedforward", "{summed: before-limits, gain: KFF}"),
+        ("9:44: no setting 'KFF'",),
+    ),
+    (
+        added("cascade", "{proportional: {on: weighted, weight: BETA}}"),
+        ("9:48: no setting 'BETA'",),
+    ),
+)
+"""Names of settings that are not there, or set something else: such a card is not loaded."""
 
 _ROOMS: dict[str, tuple[Iterable[Callable[..., Iterable[Problem]]], tuple[Case, ...]]] = {
     "statements": (statements.RULES, STATEMENTS),
@@ -626,9 +610,18 @@ def test_a_range_far_from_one_is_no_fault(edits: tuple[Edit, ...], tmp_path: Pat
     ("edits", "expected"),
     [
         ((("ratio: ALPHA", "ratio: -2"), *_NO_ALPHA), "11:56: ratio is -2; it is a number from 0 up"),
-        ((("ratio: ALPHA", "time: .nan"), *_NO_ALPHA), "11:55: time is nan; it is a number from 0 up"),
+        ((("ratio: ALPHA", "time: .nan"), *_NO_ALPHA), "11:55: nan is not a number; give one"),
         (((WINDUP, "{scheme: back-calculation, tracking-time: -5}"),), "10:89: tracking-time is -5; it is a number from 0 up"),
     ],
 )
 def test_a_number_in_place_of_a_setting_is_checked_as_a_setting_is(edits: tuple[Edit, ...], expected: str, tmp_path: Path) -> None:
     assert [expected] == headlines(faults(tmp_path, edited(VALID, *edits)))[:1]
+
+
+@pytest.mark.parametrize(("edits", "expected"), REFERENCES)
+def test_a_card_that_names_a_wrong_setting_is_not_loaded(
+    edits: tuple[Edit, ...], expected: tuple[str, ...], tmp_path: Path
+) -> None:
+    with pytest.raises(CardError) as caught:
+        loaded(tmp_path, edited(VALID, *edits))
+    assert list(expected) == headlines(list(caught.value.problems))

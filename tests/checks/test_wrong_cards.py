@@ -208,6 +208,96 @@ WRONG_WINDUP: dict[str, Case] = {
     ),
 }
 
+WRONG_NUMBERS: dict[str, Case] = {
+    "not a number as default": (("default: 0.125", "default: .nan"), ("17:69: nan is not a number; give one",)),
+    "not a number as a limit": (
+        (WINDUP, "{scheme: none}, limits: {low: .nan, high: output}"),
+        ("10:77: nan is not a number; give one",),
+    ),
+    "not a number in a range": (("[0.05, 1]", "[0.05, .nan]"), ("17:56: nan is not a number; give one",)),
+    "too large": (("default: 0.125", "default: 1e300"), ("17:69: 1e+300 is not a plausible number",)),
+    "too small": (("ratio: ALPHA", "ratio: -1e-300"), ("11:56: -1e-300 is not a plausible number",)),
+    "among off values": (("off: 0, default", "off: [0, 5e-324], default"), ("16:46: 4.94066e-324 is not a plausible number",)),
+    "in an example": (("GAIN: 2, RESET", "GAIN: 1e41, RESET"), ("45:19: 1e+41 is not a plausible number",)),
+    "a scan of no length": (
+        ("default: 1 s", "default: 1e-300 ms"),
+        ("27:17: '1e-300 ms' is not a plausible scan interval; write it like '1 s'",),
+    ),
+    "an endless scan": (
+        ("default: 1 s", "default: 1e300 h"),
+        ("27:17: '1e300 h' is not a plausible scan interval; write it like '1 s'",),
+    ),
+}
+
+_HIDDEN = "is not allowed in a text; remove it"
+
+WRONG_TEXTS: dict[str, Case] = {
+    "an escape sequence": (("The bench hums.", r'"hums \e[2J"'), (f"43:12: character U+001B {_HIDDEN}",)),
+    "NUL": (("note: from the step response", r'note: "a\0b"'), (f"33:54: character U+0000 {_HIDDEN}",)),
+    "a character that turns the direction of writing": (
+        ("The bench hums.", "hums \u202e"),
+        (f"43:12: character U+202E {_HIDDEN}",),
+    ),
+    "a character that cannot be seen": (("product: test bench", "product: te\u200bst"), (f"3:10: character U+200B {_HIDDEN}",)),
+    "the command of a terminal of eight bits": (
+        ("product: test bench", r'product: "\x9b2J"'),
+        (f"3:10: character U+009B {_HIDDEN}",),
+    ),
+    "an escape sequence as a choice": (
+        ("      PID: {}", '      "PID\\e[2J": {}'),
+        ("22:7: character U+001B is not allowed in a key; remove it",),
+    ),
+    "a line break in a choice": (
+        ("      PID: {}", '      "PID\\nimport os": {}'),
+        ("22:7: character U+000A is not allowed in a key; remove it",),
+    ),
+    "blanks around a choice": (("      PID: {}", "      'PID ': {}"), ("22:7: a key has blanks around it; remove them",)),
+    "a name of two lines": (
+        ("product: test bench", r'product: "test\nbench"'),
+        ("3:10: more than one line; a name is one line, without tabs",),
+    ),
+    "a word for the action of two lines": (
+        ("direct: Direct", r'direct: "a\nb"'),
+        ("25:37: more than one line; a name is one line, without tabs",),
+    ),
+    "a long name": (("algorithm: PID", f"algorithm: {'P' * 201}"), ("4:12: 201 characters, at most 200 are allowed",)),
+    "a long text": (("The bench hums.", "h" * 10_001), ("43:12: 10001 characters, at most 10000 are allowed",)),
+    "a setting with a long name": (
+        ("  RATE: {", f"  {'R' * 65}: {{"),
+        ("16:3: 65 characters, at most 64 are allowed",),
+    ),
+    "a long word is cut": (
+        ("form: standard", f"form: {'s' * 5000}"),
+        (f"7:7: '{'s' * 40}…{'s' * 20}' is not one of 'parallel', 'standard', 'series' or 'dahlin'",),
+    ),
+    "one word for the action": ((", direct: Direct", ""), ("25:10: names needs both 'reverse' and 'direct'",)),
+}
+
+TOO_MANY: dict[str, Case] = {
+    "settings": (
+        ("options:\n", "".join(f"  S{i}: {{sets: bias, unit: '%'}}\n" for i in range(47)) + "options:\n"),
+        ("14:3: expected 1 to 50 values, found 51",),
+    ),
+    "choices": (
+        ("      PID: {}\n", "      PID: {}\n" + "".join(f"      C{i}: {{}}\n" for i in range(49))),
+        ("22:7: expected 1 to 50 values, found 51",),
+    ),
+    "combinations of options": (
+        (
+            "options:\n  STRUCTURE",
+            "options:\n"
+            + "".join(f"  O{i}: {{default: a, choices: {{a: {{}}, b: {{}}, c: {{}}}}}}\n" for i in range(5))
+            + "  STRUCTURE",
+        ),
+        ("18:1: the options can be chosen in 486 ways, at most 200 are checked; make it several cards",),
+    ),
+    "keys and values": (
+        ("quirks:\n", "".join(f"k{i}: 1\n" for i in range(2500)) + "quirks:\n"),
+        ("1930:8: more than 4,000 keys and values; no card is that long",),
+    ),
+    "characters": (("quirks:\n", f"# {'x' * 1_000_000}\nquirks:\n"), ("1:1: 1,001,726 characters; a card has at most 1,000,000",)),
+}
+
 WRONG_NAMES: dict[str, Case] = {
     "of a setting": (("  GAIN: {", "  GAIN %: {"), (f"14:3: 'GAIN %' {_NAME}",)),
     "that starts with a digit": (("  RATE: {", "  2RATE: {"), (f"16:3: '2RATE' {_NAME}",)),
@@ -285,6 +375,9 @@ TABLES = {
     "wrong type": WRONG_TYPES,
     "wrong word": WRONG_WORDS,
     "windup": WRONG_WINDUP,
+    "number": WRONG_NUMBERS,
+    "text": WRONG_TEXTS,
+    "too many": TOO_MANY,
     "name": WRONG_NAMES,
     "choice": WRONG_CHOICES,
     "YAML": NOT_YAML,

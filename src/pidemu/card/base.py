@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
 from datetime import date
 from enum import StrEnum
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+SMALLEST: Final = 1e-40
+LARGEST: Final = 1e40
+"""Sizes between which finite numbers of cards lie, other than 0: those of float32 do, and all of engineering."""
 
 
 def _hyphen(name: str) -> str:
@@ -19,9 +24,23 @@ def _infinity(value: Any) -> Any:
     return float(value) if value in ("inf", "-inf") else value
 
 
+def _plausible(value: float) -> float:
+    if math.isnan(value):
+        raise PydanticCustomError("not_a_number", "nan is not a number; give one")
+    if value and math.isfinite(value) and not SMALLEST <= abs(value) <= LARGEST:
+        raise PydanticCustomError("implausible", "{value} is not a plausible number", {"value": f"{value:g}"})
+    return value
+
+
 def _day(value: Any) -> Any:
     if not (isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value)):  # 2026 and 0 are no days
         raise PydanticCustomError("date_type", "not a date")
+    return value
+
+
+def _line(value: str) -> str:
+    if "\n" in value or "\t" in value:
+        raise PydanticCustomError("one_line", "more than one line; a name is one line, without tabs")
     return value
 
 
@@ -38,13 +57,19 @@ class Model(BaseModel):
     )
 
 
-Text = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, Field(min_length=1, max_length=10_000)]
+"""Sentences, in one line or several; `pidemu.card.source` lets nothing in that cannot be seen."""
+
+
+Name = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_line)]
+"""What a thing is called, or where it stands: one line."""
 
 
 Number = Annotated[
     float,
     Field(strict=True),
     BeforeValidator(_infinity),
+    AfterValidator(_plausible),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
 ]
 
@@ -55,7 +80,7 @@ Day = Annotated[date, BeforeValidator(_day)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
-SettingName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+SettingName = Annotated[str, Field(max_length=64, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Form(StrEnum):
@@ -117,7 +142,7 @@ class Evidence(Model):
         description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
         "from something documented) or `assumed` (no source says so; shown wherever a result rests on it)."
     )
-    source: Text | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
+    source: Name | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
     at: Text | None = Field(
         default=None,
         description="Place in the source: page, section, function. Required for `documented` and `measured`.",

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from pidemu.card.source import Document, Path_
 from pidemu.errors import Problem, suggest
+from pidemu.excerpt import shortened
 
+_LONGEST: Final = 60
+"""Characters of a value that are shown."""
+_OF_NUMBERS: Final = ("not_a_number", "implausible")
 Locate = Callable[[Path_], Path_]
 """From a path in the value that was validated to the path in the file."""
 
@@ -51,7 +55,7 @@ def _collect(annotation: Any, path: list[str | int], keys: set[str]) -> None:
 
 def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel], scheme: object) -> str:
     kind, context = error["type"], error.get("ctx", {})
-    shown = f"'{value}'" if isinstance(value, str) else f"{value!r}"
+    shown = _shown(value)
     if kind == "extra_forbidden":
         known = _fields(model, path[:-1])
         if path[-1] in known and scheme is not None:
@@ -66,7 +70,7 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
         return "empty; write it, or remove the key"
     match kind:
         case "literal_error" if path == ("card",):
-            return f"card language {value} is unknown; this version of pidemu reads 1"
+            return f"card language {shown} is unknown; this version of pidemu reads 1"
         case "literal_error" | "enum":
             return _not_one_of(shown, str(value), str(context["expected"]))
         case "union_tag_invalid":
@@ -90,10 +94,14 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
             return _wrong_length(most, len(value), most if context.get("field_type") == "Tuple" else 1)
         case "greater_than":
             return f"{shown} is not above {'zero' if context['gt'] == 0 else context['gt']}"
+        case "one_line" | "two_names" | "not_a_number" | "implausible":
+            return str(error["msg"])
+        case "string_too_long":
+            return f"{len(value)} characters, at most {context['max_length']} are allowed"
         case "string_pattern_mismatch":
             return f"{shown} is not a name: letters, digits and underscores, starting with a letter"
         case _ if kind.startswith(("date_", "datetime_")):
-            return f"{str(value) if not isinstance(value, str) else shown} is not a date such as 2026-11-22"
+            return f"{shown} is not a date such as 2026-11-22"
         case _:
             return f"{shown}: {error['msg'][0].lower()}{error['msg'][1:]}"
 
@@ -114,7 +122,13 @@ def _kind(value: Any) -> str:
         return "nothing"
     if isinstance(value, dict):
         return "a mapping"
-    return "a list" if isinstance(value, list) else f"'{value}'"
+    return "a list" if isinstance(value, list) else f"'{shortened(str(value), _LONGEST)}'"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return _kind(value)
+    return f"'{shortened(value, _LONGEST)}'" if isinstance(value, str) else shortened(repr(value), _LONGEST)
 
 
 def problems(error: ValidationError, value: Any, model: type[BaseModel], document: Document, locate: Locate) -> Iterable[Problem]:
@@ -134,6 +148,7 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         Maps a path in `value` to its path in the file.
     """
     found: dict[tuple[Path_, bool], list[str]] = {}
+    of_numbers: dict[tuple[Path_, bool], str] = {}
     for detail in error.errors(include_url=False):
         path, here = _walk(value, detail["loc"])
         of_key = detail["loc"][-1] == "[key]"
@@ -142,13 +157,16 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         scheme = _walk(value, (*path[:-1], "scheme"))[1] if path and detail["type"] == "extra_forbidden" else None
         message = _message(detail, path, path[-1] if of_key else here, model, scheme if isinstance(scheme, str) else None)
         messages = found.setdefault((path, at_key), [])
+        if detail["type"] in _OF_NUMBERS:  # that no text may stand there either is beside the point
+            of_numbers[path, at_key] = message
         if message not in messages:
             messages.append(message)
+    above = {inner[:n] for inner, _ in found for n in range(len(inner))}
     for (path, at_key), messages in found.items():
-        if any(inner[: len(path)] == path and len(inner) > len(path) for inner, _ in found) and not at_key:
+        if path in above and not at_key:
             continue  # one branch of a union dislikes the whole, another says which part
         missing = [m for m in messages if m.startswith("missing")]
-        for message in missing or [_united(messages)]:
+        for message in missing or [of_numbers.get((path, at_key)) or _united(messages)]:
             key = (message.split("'")[1],) if missing else ()
             yield document.problem(locate((*path, *key)), message, at_key=at_key)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import stat
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from pidemu.card.load import Card, load_file
-from pidemu.errors import CardError, CardNotFoundError, suggest
+from pidemu.card.load import Card, load_file, wrong_id
+from pidemu.errors import CardError, CardNotFoundError, Problem, suggest
+from pidemu.excerpt import shortened, visible
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
@@ -41,18 +43,51 @@ def folders(extra: Sequence[str | Path] = ()) -> list[Path]:
     """
     named = [Path(f) for f in extra] + [Path(f) for f in os.environ.get(ENVIRONMENT, "").split(os.pathsep) if f]
     for folder in named:
-        if not folder.is_dir():
+        if not os.path.isdir(folder):  # pathlib's raises where the folder cannot be looked at
             raise CardNotFoundError(f"no folder '{folder}'; a folder of cards holds <vendor>/<block>.yaml")
     return [*named, builtin_folder()]
 
 
 def card_files(vendors: Sequence[str | Path] = ()) -> dict[str, Path]:
     """Return the file of every card, by id, sorted."""
-    found: dict[str, Path] = {}
+    return {card_id: file for card_id, (file, reason) in _found(vendors).items() if reason is None}
+
+
+def unusable_files(vendors: Sequence[str | Path] = ()) -> list[Problem]:
+    """Return what stands where a card would and cannot be one, with the reason: pipes, folders, links that lead nowhere."""
+    return [Problem(str(file), 1, 1, reason) for file, reason in _found(vendors).values() if reason is not None]
+
+
+def unusable(file: Path) -> str | None:
+    """Return why a file cannot be a card, before it is opened: a pipe would wait for ever."""
+    try:
+        mode = file.stat().st_mode
+    except (OSError, ValueError) as error:
+        return f"cannot be read: {getattr(error, 'strerror', None) or 'not a name of a file'}"
+    if stat.S_ISREG(mode):
+        return None
+    return "a folder; a card is a file" if stat.S_ISDIR(mode) else "a pipe or a device; a card is a plain file"
+
+
+def _found(vendors: Sequence[str | Path]) -> dict[str, tuple[Path, str | None]]:
+    """Return the file of every card by id, sorted, and why it cannot be one."""
+    found: dict[str, tuple[Path, str | None]] = {}
     for folder in folders(vendors):
-        for file in folder.glob("*/*.yaml"):
-            found.setdefault(f"{file.parent.name}/{file.stem}", file)
+        for place, reason in _inside(folder):
+            inside = _inside(place) if reason is None and place.is_dir() else []
+            entries = [(place, reason)] if reason is not None else [(f, r) for f, r in inside if r or f.suffix == ".yaml"]
+            for file, wrong in entries:
+                card_id = f"{file.parent.name}/{file.stem}"
+                found.setdefault(card_id, (file, wrong or wrong_id(card_id) or unusable(file)))
     return dict(sorted(found.items()))
+
+
+def _inside(folder: Path) -> Iterator[tuple[Path, str | None]]:
+    """Yield what is in a folder; the folder itself, with the reason, where it cannot be read."""
+    try:
+        yield from ((entry, None) for entry in folder.iterdir())
+    except OSError as error:
+        yield folder, f"cannot be read: {error.strerror}"
 
 
 def cards(vendors: Sequence[str | Path] = ()) -> list[str]:
@@ -93,13 +128,13 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     file = Path(name) if name.endswith((".yaml", ".yml")) else None
     card_id = name if file is None else None
     if file is None:
-        file = next((f for d in folders(vendors) if _is_file(f := d / f"{name}.yaml")), None) if _is_id(name) else None
-        if file is None:
-            known = cards(vendors)
-            hint = suggest(name, known) or _suggest_block(name, known)
-            raise CardNotFoundError(f"no card '{name}'{hint}; 'pidemu cards' lists them")
-    elif not _is_file(file):
-        raise CardNotFoundError(f"no file '{name}'")
+        named = [d / f"{name}.yaml" for d in folders(vendors)] if _is_id(name) else []
+        file = next((f for f in named if os.path.lexists(f)), None)
+    if file is None or not os.path.lexists(file):
+        raise _not_found(name, vendors)
+    reason = unusable(file)
+    if reason is not None:
+        raise CardError([Problem(str(file), 1, 1, reason)])
     key, changed = (file.absolute(), card_id), file.stat().st_mtime_ns
     kept = _loaded.get(key)
     if kept is None or kept[0] != changed:
@@ -107,6 +142,15 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     if isinstance(kept[1], CardError):
         raise kept[1].with_traceback(None)
     return kept[1]
+
+
+def _not_found(name: str, vendors: Sequence[str | Path]) -> CardNotFoundError:
+    shown = shortened(visible(name), 200)
+    if name.endswith((".yaml", ".yml")):
+        return CardNotFoundError(f"no file '{shown}'")
+    known = cards(vendors)
+    hint = suggest(name, known) or _suggest_block(name, known)
+    return CardNotFoundError(f"no card '{shown}'{hint}; 'pidemu cards' lists them")
 
 
 def _read(file: Path, card_id: str | None) -> Card | CardError:

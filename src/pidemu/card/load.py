@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import itertools
+import math
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import ValidationError
 
 from pidemu.card.base import Evidence, Status
 from pidemu.card.faults import problems
 from pidemu.card.models import CardFile, Equation, Setting
+from pidemu.card.references import named_settings
 from pidemu.card.source import Document, Path_, parse_file
-from pidemu.errors import CardError, Problem, SettingError, suggest
+from pidemu.errors import CardError, Problem, SettingError, capped, suggest
+from pidemu.excerpt import is_hidden
 
 if TYPE_CHECKING:
     from pidemu.settings import Settings
@@ -47,6 +51,9 @@ _BEYOND_THE_LAW = (
     "resolution",
 )
 """What dials set that the linear law leaves out."""
+MOST_COMBINATIONS: Final = 200
+"""Combinations of options, all of which are checked."""
+_LONGEST_ID: Final = 200
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
 
@@ -303,7 +310,9 @@ class Card:
         raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
         if isinstance(raw.get("settings"), dict):  # dials that choices add stand in their usual place, not at the end
             raw["settings"] = dict(sorted(raw["settings"].items(), key=_usual_place))
-        return Variant(self, chosen, _equation(raw, self.document, chosen), raw)
+        variant = Variant(self, chosen, _equation(raw, self.document, chosen), raw)
+        _refuse_wrong_references(variant)
+        return variant
 
     def settings(self, given: Mapping[str, object] | None = None, /, **values: object) -> Settings:
         """Return settings of this card.
@@ -365,7 +374,22 @@ def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]
     try:
         return Equation.model_validate(raw)
     except ValidationError as error:
-        raise CardError(problems(error, raw, Equation, document, locate)) from None
+        raise CardError(capped(problems(error, raw, Equation, document, locate))) from None
+
+
+def _refuse_wrong_references(variant: Variant) -> None:
+    """Refuse an equation that names a setting which is not there, or sets something else: nothing could be computed with it."""
+    settings, document = variant.equation.settings, variant.card.document
+    found = []
+    for path, name, role in named_settings(variant.equation):
+        setting = settings.get(name)
+        if setting is None:
+            found.append(document.problem(variant.home(path), f"no setting '{name}'{suggest(name, settings)}"))
+        elif setting.sets != role:
+            message = f"'{name}' sets the {setting.sets}; here one that sets the {role} is needed"
+            found.append(document.problem(variant.home(path), message))
+    if found:
+        raise CardError(capped(found))
 
 
 def card_from(document: Document, card_id: str) -> Card:
@@ -383,16 +407,24 @@ def card_from(document: Document, card_id: str) -> Card:
     CardError
         The document is no valid card: every problem, located, in the card itself and in each choice of its options.
     """
+    if "card" not in document.value:  # what another file holds is not told
+        raise CardError([document.problem((), "missing key 'card'")])
     try:
         data = CardFile.model_validate(document.value)
     except ValidationError as error:
-        raise CardError(sorted(problems(error, document.value, CardFile, document, lambda p: p))) from None
+        raise CardError(capped(problems(error, document.value, CardFile, document, lambda p: p))) from None
     card = Card(card_id, data, document)
     found: list[Problem] = []
     for name, option in data.options.items():
         if option.default not in option.choices:
             message = f"default '{option.default}' is not one of the choices: {', '.join(option.choices)}"
             raise CardError([document.problem(("options", name, "default"), message)])
+    combinations = math.prod(len(option.choices) for option in data.options.values())
+    if combinations > MOST_COMBINATIONS:
+        message = (
+            f"the options can be chosen in {combinations} ways, at most {MOST_COMBINATIONS} are checked; make it several cards"
+        )
+        raise CardError([document.problem(("options",), message, at_key=True)])
     for name, option in data.options.items():
         for choice, fields in option.choices.items():
             where = ("options", name, "choices", choice)
@@ -406,7 +438,7 @@ def card_from(document: Document, card_id: str) -> Card:
                 except CardError as error:
                     found += error.problems
     if found:
-        raise CardError(sorted(set(found)))
+        raise CardError(capped(found))
     return card
 
 
@@ -425,7 +457,20 @@ def load_file(file: Path, card_id: str | None = None, shown: str | None = None) 
     Raises
     ------
     CardError
-        See `card_from` and `parse_file`.
+        See `card_from` and `parse_file`; or its name cannot be an id.
     """
-    resolved = file.resolve()
-    return card_from(parse_file(file, shown), card_id or f"{resolved.parent.name}/{resolved.stem}")
+    path = Path(os.path.realpath(file))  # which also says something of links that go round
+    card_id = card_id or f"{path.parent.name}/{path.stem}"
+    wrong = wrong_id(card_id)
+    if wrong is not None:
+        raise CardError([Problem(shown or str(file), 1, 1, wrong)])
+    return card_from(parse_file(file, shown), card_id)
+
+
+def wrong_id(card_id: str) -> str | None:
+    """Return what is wrong with a card's id, which are the names of its folder and file."""
+    if any(is_hidden(c) for c in card_id):
+        return "the name of the file or folder has characters that cannot be seen; rename it"
+    if len(card_id) > _LONGEST_ID:
+        return f"the names of folder and file have {len(card_id)} characters; at most {_LONGEST_ID} are allowed"
+    return None

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pidemu.card.base import Evidence, Form, Model, Number, SettingName, Source, Text
+from pidemu.card.base import Evidence, Form, Model, Name, Number, SettingName, Source, Text
 from pidemu.card.integral import Integral
 from pidemu.card.stages import Action, Arithmetic, Faults, Output, Scan, Transfer
 from pidemu.card.terms import Cascade, Derivative, ErrorShape, Feedforward, Measurement, Proportional, Setpoint
@@ -26,7 +26,7 @@ class Setting(Model):
         "process-time", "process-delay", "closed-loop-time",
     ] = Field(description="What the dial sets, and with that its unit's meaning; see *Settings* above, and specs/equations.md, "
               "section 1.")  # fmt: skip
-    unit: Text = Field(
+    unit: Name = Field(
         description="Unit of a bare number, such as `%/%`, `%` (proportional band), `s/repeat`, `repeat/min`, `1/s`, `min`, `Hz`, "
         "`eu`, `%/s`."
     )
@@ -39,7 +39,7 @@ class Setting(Model):
     range: tuple[Number, Number] | None = Field(
         default=None, description="Smallest and largest value, in `unit`; off values may lie outside."
     )
-    off: Number | list[Number] | None = Field(
+    off: Number | Annotated[list[Number], Field(max_length=10)] | None = Field(
         default=None, description="Value, or values, that switch the term off; the first is used in conversions."
     )
     scope: Literal["loop", "module"] = Field(
@@ -55,9 +55,10 @@ class Option(Model):
     """Something the vendor lets you choose per loop."""
 
     about: Text | None = Field(default=None, description="The vendor's own name or words for it.")
-    default: Text = Field(description="The choice taken when none is given.")
-    choices: dict[Text, dict[str, Any]] = Field(
+    default: Name = Field(description="The choice taken when none is given.")
+    choices: dict[Name, dict[str, Any]] = Field(
         min_length=1,
+        max_length=50,
         description="What each choice changes: the fields of the algorithm that it overlays, as in the card itself. `filter` and "
         "`windup` are replaced whole; null removes a key.",
     )
@@ -67,7 +68,7 @@ class Quirk(Model):
     """A fact worth knowing that the equation does not show."""
 
     text: Text = Field(description="The fact.")
-    source: Text | None = Field(default=None, description="Key of an entry under `sources`.")
+    source: Name | None = Field(default=None, description="Key of an entry under `sources`.")
     at: Text | None = Field(default=None, description="Place in the source.")
 
 
@@ -83,17 +84,18 @@ class Canonical(Model):
 class Example(Model):
     """Settings and what they amount to; a test runs every one."""
 
-    given: dict[str, str | Number] = Field(description="Settings and options by name.")
+    given: dict[Name, Name | Number] = Field(description="Settings and options by name.")
     canonical: Canonical | None = Field(
         default=None,
         description="The equivalent parallel gains of the feedback path, to six digits. At least one of `canonical` and `outputs`.",
     )
     outputs: list[Number] | None = Field(
         default=None,
+        max_length=1000,
         description="The output of the first automatic scans after a setpoint step of 1 from rest at 50, less the output before, "
         "at the card's scan interval and without limits; to six digits.",
     )
-    source: Text | None = Field(
+    source: Name | None = Field(
         default=None,
         description="Key of an entry under `sources`, where the example is printed; absent if it is our own arithmetic.",
     )
@@ -141,27 +143,27 @@ class Equation(Model):
         description="What signals that are not numbers and scan intervals of zero or less do; nothing is computed "
         "and the output stands, if absent.",
     )
-    settings: dict[SettingName, Setting] = Field(min_length=1, description="The dials, by the vendor's own names.")
+    settings: dict[SettingName, Setting] = Field(min_length=1, max_length=50, description="The dials, by the vendor's own names.")
 
 
 class CardFile(Equation):
     """One PID algorithm of one product."""
 
     card: Literal[1] = Field(description="Version of the card language.")
-    vendor: Text = Field(description="Maker, or the community that keeps the program.")
-    product: Text = Field(description="Product line.")
-    algorithm: Text = Field(description="The algorithm within the product.")
+    vendor: Name = Field(description="Maker, or the community that keeps the program.")
+    product: Name = Field(description="Product line.")
+    algorithm: Name = Field(description="The algorithm within the product.")
     kind: Literal["product", "software", "equation"] = Field(
         default="product",
         description="`product`: what is not stated of a loop was set at the site, and is asked for where it matters. `software`: "
         "what is not given runs with its documented default. `equation`: a textbook's, which takes the signals of the other side.",
     )
     about: Text | None = Field(default=None, description="What a reader should know first, in a few sentences.")
-    sources: dict[Text, Source] = Field(description="What the card rests on, by a short key.")
-    options: dict[SettingName, Option] = Field(default={}, description="What the vendor lets you choose per loop.")
-    evidence: dict[Text, Evidence] = Field(
+    sources: dict[Name, Source] = Field(max_length=100, description="What the card rests on, by a short key.")
+    options: dict[SettingName, Option] = Field(default={}, max_length=20, description="What the vendor lets you choose per loop.")
+    evidence: dict[Name, Evidence] = Field(
         description="Where each statement comes from: a path in the card, such as `derivative.filter` or "
         "`options.FORM.choices.Series`, covers everything below it; the longest path wins."
     )
-    quirks: list[Quirk] = Field(default=[], description="Facts worth knowing that the equation does not show.")
-    examples: list[Example] = Field(min_length=1, description="Settings and what they amount to; every one is run.")
+    quirks: list[Quirk] = Field(default=[], max_length=100, description="Facts worth knowing that the equation does not show.")
+    examples: list[Example] = Field(min_length=1, max_length=50, description="Settings and what they amount to; every one is run.")

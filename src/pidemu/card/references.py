@@ -44,6 +44,10 @@ _FIELDS: Final = (
 """Fields that may name a setting, and what that setting must set."""
 
 
+_WORDS: Final = {"tracking-time": ("Ti", "sqrt(Ti Td)"), "integral-limit": ("output",)}
+"""Words that stand where a setting's name could."""
+
+
 def references(equation: Equation) -> Iterator[tuple[tuple[str, ...], object, str]]:
     """Yield every field that may name a setting: its path, its value, and the role that the setting must have."""
     for path, role in _FIELDS:
@@ -52,6 +56,13 @@ def references(equation: Equation) -> Iterator[tuple[tuple[str, ...], object, st
             part = getattr(part, key, None)
         if part is not None:
             yield tuple(key.replace("_", "-") for key in path), part, role
+
+
+def named_settings(equation: Equation) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    """Yield every field that names a setting: its path, the name, and the role that the setting must have."""
+    for path, name, role in references(equation):
+        if isinstance(name, str) and name not in _WORDS.get(role, ()):
+            yield path, name, role
 
 
 def is_active(equation: Equation, name: str, setting: Setting) -> bool:

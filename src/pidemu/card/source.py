@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import yaml
 
-from pidemu.errors import CardError, Problem
-from pidemu.excerpt import visible
+from pidemu.errors import CardError, Problem, capped
+from pidemu.excerpt import is_hidden, shortened, visible
 from pidemu.files.reading import Kind, read_text
 
 Path_ = tuple[str | int, ...]
@@ -25,6 +25,16 @@ Path_ = tuple[str | int, ...]
 _Loader: Final[Any] = getattr(yaml, "CLoader", yaml.Loader)
 _MAX_DEPTH: Final = 32
 CARD: Final = Kind("a card", "a card starts with 'card: 1'", limit=2**22, pipes=False)
+_MOST_CHARACTERS: Final = 1_000_000
+"""The longest card that comes with pidemu has 15,000."""
+_MOST_THINGS: Final = 4_000
+"""Keys and values of a card; the largest that comes with pidemu has a thousand."""
+_FIRST: Final = re.compile(
+    r"(?:[ \t]*(?:#.*|---)?\r?\n)*(?:card:[ \t]+\S{1,200}[ \t]*(?:#.*)?\r?$|[ \t]*\{\s*[\"']?card[\"']?:)", re.MULTILINE
+)
+"""How a card begins, and a loop that names one."""
+_BEGINNING: Final = 20_000
+"""Characters within which it does, behind comments."""
 
 _INT: Final = re.compile(r"[-+]?[0-9]+$")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
@@ -59,6 +69,8 @@ class Document:
         Place of every value, and of every mapping key, by path.
     digest : str
         SHA-256 of the text, in hexadecimal; that of the file where its lines end in a line feed alone.
+    is_card : bool
+        Whether the text is that of a card or a loop, be it a wrong one; an error shows nothing of any other file.
     """
 
     path: str
@@ -67,6 +79,12 @@ class Document:
     values: dict[Path_, Place] = field(default_factory=dict)
     keys: dict[Path_, Place] = field(default_factory=dict)
     digest: str = ""
+    is_card: bool = False
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The lines that an error may show."""
+        return self.lines if self.is_card else ()
 
     def problem(self, path: Path_, message: str, *, at_key: bool = False) -> Problem:
         """Return a problem placed at `path`, or at the nearest enclosing thing that exists."""
@@ -75,8 +93,8 @@ class Document:
             for table in places:
                 place = table.get(path[:end])
                 if place is not None:
-                    return Problem(self.path, place.line, place.column, message, place.width, self.lines)
-        return Problem(self.path, 1, 1, message, 1, self.lines)
+                    return Problem(self.path, place.line, place.column, message, place.width, self.shown)
+        return Problem(self.path, 1, 1, message, 1, self.shown)
 
 
 def _scalar(text: str, plain: bool) -> Any:
@@ -101,32 +119,57 @@ class _Reader:
         self.kind = kind.name.removeprefix("a ")
         self.problems: list[Problem] = []
         self.events: Any = None
+        self.things = 0
 
     def fail(self, mark: Any, message: str, width: int = 1) -> None:
         if mark.line >= len(self.document.lines):  # the parser's mark lies past the text
             line, column = max(1, len(self.document.lines)), 1
         else:
             line, column = mark.line + 1, mark.column + 1
-        self.problems.append(Problem(self.document.path, line, column, message, width, self.document.lines))
+        self.problems.append(Problem(self.document.path, line, column, message, width, self.document.shown))
 
     def place(self, event: Any) -> Place:
         start, end = event.start_mark, event.end_mark
         width = end.column - start.column if end.line == start.line else 1
         return Place(start.line + 1, start.column + 1, max(1, width))
 
+    def named(self, kind: str, name: str) -> str:
+        """Return what is told of a name: the name itself in a card only."""
+        return f"{kind} '{shortened(name, 60)}'" if self.document.is_card else f"{'an' if kind[0] == 'a' else 'a'} {kind}"
+
+    def count(self, event: Any) -> None:
+        self.things += 1
+        if self.things > _MOST_THINGS:
+            self.fail(event.start_mark, f"more than {_MOST_THINGS:,} keys and values; no card is that long")
+            raise CardError(capped(self.problems))
+
+    def refuse_hidden(self, event: Any, allowed: str) -> None:
+        """Refuse what is not seen as itself, or is obeyed by terminals: escape sequences, what turns the direction of writing."""
+        if event.value.isprintable():
+            return
+        found = next((c for c in event.value if c not in allowed and is_hidden(c)), None)
+        if found is not None:
+            where = "a key" if not allowed else "a text"
+            self.fail(
+                event.start_mark, f"character U+{ord(found):04X} is not allowed in {where}; remove it", self.place(event).width
+            )
+
     def read(self, event: Any, path: Path_) -> Any:
+        self.count(event)
         self.document.values[path] = self.place(event)
         tag = getattr(event, "tag", None)
         if tag not in (None, "!"):
-            self.fail(event.start_mark, f"tag '{tag}' is not used in {self.kind}s; remove it")
+            self.fail(event.start_mark, f"{self.named('tag', tag)} is not used in {self.kind}s; remove it")
         if isinstance(event, yaml.AliasEvent):
-            self.fail(event.start_mark, f"alias '*{event.anchor}' is not used in {self.kind}s; write the value out")
+            alias = self.named("alias", f"*{event.anchor}")
+            self.fail(event.start_mark, f"{alias} is not used in {self.kind}s; write the value out")
             return None
         if isinstance(event, yaml.ScalarEvent):
+            self.refuse_hidden(event, "\n\t")
             return _scalar(event.value, event.implicit[0])
         if len(path) > _MAX_DEPTH:
             self.fail(event.start_mark, f"nested more than {_MAX_DEPTH} levels deep")
-            raise CardError(self.problems)
+            raise CardError(capped(self.problems))
         if isinstance(event, yaml.SequenceStartEvent):
             items: list[Any] = []
             while not isinstance(child := next(self.events), yaml.SequenceEndEvent):
@@ -142,16 +185,24 @@ class _Reader:
                 name = f"?{len(mapping)}"
                 self.read(key, (*path, name))
             else:
-                name = key.value
+                name = self.key(key)
             here = (*path, name)
             if name in mapping:
                 first = self.document.keys[here].line
-                self.fail(key.start_mark, f"duplicate key '{name}' (first on line {first}); keep one", len(name))
+                self.fail(key.start_mark, f"{self.named('duplicate key', name)} (first on line {first}); keep one", len(name))
                 here = (*path, f"{name} ")
             self.document.keys[here] = self.place(key)
             value = self.read(next(self.events), here)
             mapping.setdefault(name, value)
         return mapping
+
+    def key(self, event: Any) -> str:
+        name: str = event.value
+        self.count(event)
+        self.refuse_hidden(event, "")
+        if name != name.strip():
+            self.fail(event.start_mark, "a key has blanks around it; remove them", self.place(event).width)
+        return name
 
 
 def parse(text: str, path: str, kind: Kind = CARD) -> Document:
@@ -177,7 +228,10 @@ def parse(text: str, path: str, kind: Kind = CARD) -> Document:
         The text is not YAML, is empty, or uses what cards do not: every problem found, with its place.
     """
     digest = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
-    document = Document(path, tuple(text.splitlines()), digest=digest)
+    document = Document(path, tuple(text.splitlines()), digest=digest, is_card=_FIRST.match(text, 0, _BEGINNING) is not None)
+    if len(text) > _MOST_CHARACTERS:
+        message = f"{len(text):,} characters; {kind.name} has at most {_MOST_CHARACTERS:,}"
+        raise CardError([Problem(path, 1, 1, message, 1, document.shown)])
     reader = _Reader(document, kind)
     try:
         reader.events = iter(yaml.parse(text, Loader=_Loader))
@@ -196,22 +250,23 @@ def parse(text: str, path: str, kind: Kind = CARD) -> Document:
             line = max(1, len(document.lines))
             column = len(document.lines[-1]) + 1 if document.lines else 1
         message = f"not YAML: {error.problem or error.context}"
-        reader.problems.append(Problem(path, line, column, message, 1, document.lines))
+        reader.problems.append(Problem(path, line, column, message, 1, document.shown))
     except yaml.reader.ReaderError as error:
         before = text.encode(errors="surrogatepass")[: error.position].decode(errors="ignore")  # the parser counts bytes
         code = error.character if isinstance(error.character, int) else ord(error.character)
         line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
         message = f"character U+{code:04X} is not allowed in YAML; remove it"
-        reader.problems.append(Problem(path, line, column, message, 1, document.lines))
+        reader.problems.append(Problem(path, line, column, message, 1, document.shown))
     except UnicodeEncodeError as error:
         before = text[: error.start]
         line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
-        reader.problems.append(Problem(path, line, column, "half a Unicode pair; remove it", 1, document.lines))
+        reader.problems.append(Problem(path, line, column, "half a Unicode pair; remove it", 1, document.shown))
     if not reader.problems and not isinstance(document.value, dict):
         what = "empty" if document.value is None else "not a mapping"
-        reader.problems.append(Problem(path, 1, 1, f"the file is {what}; {kind.remedy}", 1, document.lines))
+        reader.problems.append(Problem(path, 1, 1, f"the file is {what}; {kind.remedy}", 1, document.shown))
+    document.is_card = document.is_card or (isinstance(document.value, dict) and isinstance(document.value.get("card"), int | str))
     if reader.problems:
-        raise CardError(sorted(reader.problems))
+        raise CardError(capped(reader.problems))
     return document
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
-from pidemu.card.base import Flag, Model, Number, Reference, Text
+from pidemu.card.base import Flag, Model, Name, Number, Reference
 
 STARTS: Final = {
     "bumpless": "does not bump",
@@ -115,10 +116,16 @@ class Arithmetic(Model):
 class ActionExample(Model):
     """One scan that shows which way the output moves, since vendors disagree on the words."""
 
-    name: Text = Field(description="The vendor's word, one of `names`.")
+    name: Name = Field(description="The vendor's word, one of `names`.")
     sp: Number = Field(description="Setpoint; the measurement starts there.")
     pv: Number = Field(description="Measurement at the next scan.")
     output: Literal["rises", "falls"] = Field(description="Which way the output moves.")
+
+
+def _both(names: dict[str, str]) -> dict[str, str]:
+    if len(names) < 2:
+        raise PydanticCustomError("two_names", "names needs both 'reverse' and 'direct'")
+    return names
 
 
 class Action(Model):
@@ -136,7 +143,7 @@ class Action(Model):
         "vendor writes the direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all "
         "the same.",
     )
-    names: dict[Literal["reverse", "direct"], Text] = Field(
+    names: Annotated[dict[Literal["reverse", "direct"], Name], AfterValidator(_both)] = Field(
         description="The vendor's words for reverse acting (output falls when the measurement rises) and direct acting."
     )
     example: ActionExample = Field(description="One scan that shows the meaning of the words; a test runs it.")
@@ -145,7 +152,7 @@ class Action(Model):
 class Scan(Model):
     """Scan interval."""
 
-    default: Text = Field(description="Interval used when none is given, such as `1 s`.")
+    default: Name = Field(description="Interval used when none is given, such as `1 s`.")
     interval: Literal["nominal", "measured"] = Field(
         default="nominal",
         description="What the equations use where scans come unevenly: the nominal interval, or the one measured since the last "

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pidemu.card.load import Card, load_file, variants
 from pidemu.checks import equations, runs, statements
-from pidemu.errors import CardError, Problem
+from pidemu.errors import CardError, Problem, capped
 
 
 def check(card: Card) -> list[Problem]:
@@ -24,7 +24,7 @@ def check(card: Card) -> list[Problem]:
             found |= {p for run in runs.RULES for p in run(card)}
     except CardError as error:  # two choices, each fine by itself, do not go together
         found = set(error.problems)
-    return sorted(found)
+    return capped(found)
 
 
 def check_file(file: Path, card_id: str | None = None, shown: str | None = None) -> list[Problem]:

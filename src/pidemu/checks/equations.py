@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.base import Rule
-from pidemu.card.load import Variant, dotted, variants
+from pidemu.card.load import Variant, dotted
 from pidemu.card.models import Equation
-from pidemu.card.references import BY_ROLE, references
+from pidemu.card.references import references
 from pidemu.card.source import Path_
 from pidemu.card.terms import Derivative, Proportional
 from pidemu.checks import stages
-from pidemu.errors import PidemuError, Problem, UnitError, suggest
+from pidemu.errors import PidemuError, Problem, UnitError
 from pidemu.settings import limits, off_values
 from pidemu.units import LEVELS, RATES, Dimension, Role, Unit, check_unit, parse_quantity, parse_unit
 
@@ -41,9 +41,10 @@ _NEUTRAL: Final = {
 
 _OF_TERMS: Final = ("gain", "multiplier", "integral", "derivative", "bias")
 _OF_THE_PROCESS: Final = ("process-gain", "process-time", "process-delay", "closed-loop-time")
+_SHORTEST_SCAN: Final = 1e-6
+_LONGEST_SCAN: Final = 1e6
+"""Plausible scan intervals [s]."""
 _RATES: Final = ("output-rate", "setpoint-rate")
-_WORDS: Final = {"tracking-time": ("Ti", "sqrt(Ti Td)"), "integral-limit": ("output",)}
-"""Words that stand where a setting's name could."""
 
 
 def reject_bad_units(variant: Variant) -> Iterator[Problem]:
@@ -104,8 +105,6 @@ def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
         low, high = limits(s)
         if not low < high:
             yield document.problem((*home, "range"), f"range {low:g} to {high:g} does not ascend")
-        elif s.default is not None and math.isnan(s.default):
-            yield document.problem((*home, "default"), "default is not a number")
         elif s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
             yield document.problem(
                 (*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and is not an off value"
@@ -132,8 +131,10 @@ def reject_bad_scan(variant: Variant) -> Iterator[Problem]:
     """The default scan interval is a time above zero."""
     try:
         number, unit = parse_quantity(variant.equation.scan.default)
-        if unit is None or unit.dimension is not Dimension.TIME or unit.scans or not 0 < number < math.inf:
+        if unit is None or unit.dimension is not Dimension.TIME or unit.scans or not number > 0:
             raise PidemuError(f"'{variant.equation.scan.default}' is not a time; write it like '1 s'")
+        if not _SHORTEST_SCAN <= number * unit.factor <= _LONGEST_SCAN:
+            raise PidemuError(f"'{variant.equation.scan.default}' is not a plausible scan interval; write it like '1 s'")
     except PidemuError as error:
         yield variant.card.document.problem(variant.home(("scan", "default")), str(error))
 
@@ -166,41 +167,21 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
             yield document.problem(variant.home(("settings", dials[0])), message, at_key=True)
 
 
-def reject_bad_references(variant: Variant) -> Iterator[Problem]:
-    """A field that names a setting names one with the right role, a number in its place is one, and every such setting is named."""
-    equation, document = variant.equation, variant.card.document
-    for path, name, role in references(equation):
-        if isinstance(name, float):
-            wrong = _wrong_number(str(path[-1]), role, name)
-            if wrong is not None:
-                yield document.problem(variant.home(path), wrong)
-        if not isinstance(name, str) or name in _WORDS.get(role, ()):
-            continue
-        setting = equation.settings.get(name)
-        if setting is None:
-            yield document.problem(variant.home(path), f"no setting '{name}'{suggest(name, equation.settings)}")
-        elif setting.sets != role:
-            yield document.problem(variant.home(path), f"'{name}' sets the {setting.sets}; here one that sets the {role} is needed")
-    used = {name for v in variants(variant.card) for name in _used(v.equation)}
-    for name in equation.settings:
-        if name not in used:
-            yield document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
+def reject_bad_constants(variant: Variant) -> Iterator[Problem]:
+    """A number in place of a setting's name is one that such a setting could have."""
+    for path, number, role in references(variant.equation):
+        wrong = _wrong_number(str(path[-1]), role, number) if isinstance(number, float) else None
+        if wrong is not None:
+            yield variant.card.document.problem(variant.home(path), wrong)
 
 
 def _wrong_number(field: str, role: str, x: float) -> str | None:
     """Return what is wrong with a number that stands where a setting's name could."""
     if role in ("integral-limit", "windup-limit"):
-        return f"{field} is {x:g}; it is a number" if math.isnan(x) else None
+        return None
     if not 0 <= x < math.inf and role != "filter-factor":  # which has a rule of its own
         return f"{field} is {x:g}; it is a number from 0 up"
     return f"{field} is 0: nothing would ever move; give a number above 0" if x == 0 and role in _RATES else None
-
-
-def _used(equation: Equation) -> Iterator[object]:
-    """Yield the settings that an equation uses: by a field that names them, or by their role."""
-    yield from (name for _, name, _ in references(equation))
-    off = {"integral": equation.integral.on == "none", "derivative": equation.derivative.on == "none"}
-    yield from (n for n, s in equation.settings.items() if s.sets in BY_ROLE and not off.get(s.sets, False))
 
 
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
@@ -267,9 +248,7 @@ def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
     home = variant.home(("action", "example"))
     words = {word: sense for sense, word in names.items()}
     at_names = variant.home(("action", "names"))
-    if set(names) != {"reverse", "direct"}:
-        yield variant.card.document.problem(at_names, "names needs both 'reverse' and 'direct'", at_key=True)
-    elif len(words) == 1:
+    if len(words) == 1:
         yield variant.card.document.problem(at_names, f"reverse and direct have the same name '{names['reverse']}'", at_key=True)
     elif example.name not in words:
         yield variant.card.document.problem(home, f"'{example.name}' is not one of the names: {', '.join(words)}", at_key=True)
@@ -290,7 +269,7 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_unexplained_defaults,
     reject_bad_scan,
     reject_missing_dials,
-    reject_bad_references,
+    reject_bad_constants,
     reject_bad_weights,
     reject_bad_filter,
     reject_bad_windup,

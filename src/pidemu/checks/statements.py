@@ -8,6 +8,8 @@ from typing import Final
 
 from pidemu.card.base import Status
 from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
+from pidemu.card.models import Equation
+from pidemu.card.references import BY_ROLE, references
 from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
 from pidemu.ranges import RANGES
@@ -75,7 +77,7 @@ def reject_proof_from_another_product(card: Card) -> Iterator[Problem]:
 
 def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
     """An evidence path leads to something in the card."""
-    known = {dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1)}
+    known = dict.fromkeys(dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1))
     for key in card.data.evidence:
         if key not in known and key != EMULATION:
             yield card.document.problem(("evidence", key), f"nothing at '{key}' in this card{suggest(key, known)}", at_key=True)
@@ -109,6 +111,22 @@ def reject_overlapping_options(card: Card) -> Iterator[Problem]:
                 yield card.document.problem(("options", name), message, at_key=True)
 
 
+def reject_unused_settings(card: Card) -> Iterator[Problem]:
+    """A dial does something under some choice of options."""
+    used = {name for variant in variants(card) for name in _used(variant.equation)}
+    for variant in variants(card):
+        for name in variant.equation.settings:
+            if name not in used:
+                yield card.document.problem(variant.home(("settings", name)), f"nothing uses '{name}'", at_key=True)
+
+
+def _used(equation: Equation) -> Iterator[object]:
+    """Yield the settings that an equation uses: by a field that names them, or by their role."""
+    yield from (name for _, name, _ in references(equation))
+    off = {"integral": equation.integral.on == "none", "derivative": equation.derivative.on == "none"}
+    yield from (n for n, s in equation.settings.items() if s.sets in BY_ROLE and not off.get(s.sets, False))
+
+
 def reject_ambiguous_names(card: Card) -> Iterator[Problem]:
     """Settings and options are told apart by name alone, in upper or lower case."""
     seen: dict[str, str] = {}
@@ -130,5 +148,6 @@ RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
     reject_evidence_for_nothing,
     reject_fields_without_evidence,
     reject_overlapping_options,
+    reject_unused_settings,
     reject_ambiguous_names,
 )

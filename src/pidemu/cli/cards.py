@@ -7,7 +7,7 @@ from collections import Counter
 import click
 
 from pidemu.card.base import Status
-from pidemu.card.library import card_files
+from pidemu.card.library import card_files, unusable_files
 from pidemu.card.load import Card, load_file
 from pidemu.cli.common import echo, json_option, print_json, table, vendors_option
 from pidemu.errors import CardError
@@ -23,7 +23,7 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
     Beside each: how many of its statements are documented, measured, inferred or assumed.
     """
     rows: list[Card] = []
-    broken: list[str] = []
+    broken = [problem.headline() for problem in unusable_files(vendors)]
     for card_id, file in card_files(vendors).items():
         try:
             card = load_file(file, card_id)

@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Print what CARD with the settings NAME=VALUE does in one scan, as a module that runs on its own.
 
-    The comment at the top names what the program rests on and no source of the card states: rules, windup, transfer, limits.
+    Its head names what the program rests on and no source of the card states: rules, windup, transfer, limits.
     """
     from pidemu.targets.c import check_name
 
@@ -64,7 +64,7 @@ def command(
 
 
 def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
-    """Return what the comment at the top says of the card's evidence."""
+    """Return what the head says of the card's evidence."""
     found = facts(unverified_program(settings, scan=scan, limits=limits))
     if not found:
         return [f"Every field of the card {settings.card.id} that makes this program is documented or measured."]
@@ -74,7 +74,7 @@ def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
 def _name(card_id: str) -> str:
     """Return a name in C after a card: its letters and digits, one underscore for anything else."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", card_id).strip("_")
-    return name if name[:1].isalpha() else f"pid_{name}"
+    return name if name[:1].isalpha() else f"pid_{name}".rstrip("_")
 
 
 def _printed(program: Program, lang: str, name: str, notes: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import default_scan
-from pidemu.card.base import Form
+from pidemu.card.base import LARGEST, SMALLEST, Form
 from pidemu.errors import ScanError
 from pidemu.explanation.dials import dials_of, not_stated, ranges_missing
 from pidemu.explanation.forms import Forms, Times, forms_of
@@ -122,4 +122,5 @@ def _filters(settings: Settings, a: Algorithm, forms: Forms | None) -> Iterator[
 def _ratio(a: Algorithm, forms: Forms | None, own: str) -> float | None:
     """Return the filter time per derivative time of a form, where there are both."""
     times: Times | None = None if forms is None else getattr(forms, own)
-    return a.Tf / times.Td if times is not None and times.Td else None
+    ratio = a.Tf / times.Td if times is not None and times.Td else 0.0
+    return ratio if SMALLEST <= ratio <= LARGEST else None

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pidemu.algorithm import Algorithm
+from pidemu.card.base import LARGEST, SMALLEST
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,9 @@ def forms_of(a: Algorithm, own: str, *, lead_lag: bool) -> Forms:
         Whether it is a series form whose derivative is a lead-lag.
     """
     parallel = _parallel(a)
+    if not all(x == 0 or SMALLEST <= abs(x) <= LARGEST for x in (parallel.kp, parallel.ki, parallel.kd, a.kp, a.kd, a.Tf)):
+        told = dict.fromkeys(("standard", "series"), "a gain or time is too large or too small to compute with")
+        return Forms(parallel, None, None, told, own, a.has_term_filter, lead_lag or not a.series)
     standard, no_standard = _standard(parallel)
     if a.series and a.kp:
         lead = a.kd + (a.kp * a.Tf if lead_lag else 0.0)

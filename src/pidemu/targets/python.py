@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from pidemu.scan.precision import explicit
-from pidemu.scan.program import Program, Structure, names_in
+from pidemu.scan.program import Program, Quantity, Structure, names_in
 from pidemu.scan.specialise import specialise
-from pidemu.targets.comments import python_comments
+from pidemu.targets.comments import comment_text, python_head
 from pidemu.targets.expressions import literal, render
 from pidemu.targets.runner import Floats, Run, Runner
 
@@ -27,11 +27,19 @@ def _precision(program: Program, name: str) -> str:
     return "float64" if program.is_wide(name) else "float32"
 
 
+def _said(code: str, text: str, column: int = 64) -> str:
+    return f"{code:<{column}}  # {comment_text(text)}"
+
+
+def _with_unit(quantity: Quantity) -> str:
+    return f"{quantity.text} [{quantity.unit}]"
+
+
 def _body(program: Program, indent: str) -> list[str]:
     lines = []
     for assign in explicit(program):
         code = f"{indent}{assign.name} = {render(assign.value)}"
-        lines.append(f"{code:<64}  # {assign.text}")
+        lines.append(_said(code, assign.text))
     return lines
 
 
@@ -48,7 +56,7 @@ def _states(program: Program) -> str:
 
 
 def _delayed(program: Program, indent: str) -> list[str]:
-    return [f"{f'{indent}{line.name} = {line.name}_line.popleft()':<64}  # {line.text}" for line in program.lines]
+    return [_said(f"{indent}{line.name} = {line.name}_line.popleft()", line.text) for line in program.lines]
 
 
 def _waiting(program: Program, indent: str) -> list[str]:
@@ -118,15 +126,15 @@ def source(program: Program, notes: Sequence[str] = ()) -> str:
     program : Program
         What to print.
     notes : sequence of str
-        What stands in the comment at the top, below the title, a line each.
+        What stands in the docstring, below the title, a line each.
     """
-    lines = [*python_comments(program.title, notes), ""]
+    lines = [*python_head(program.title, notes), ""]
     lines += _imports(program)
     for quantity, value in zip(program.coefficients, program.values, strict=True):
-        lines.append(f"{f'{quantity.name} = {_number(program, quantity.name, value)}':<32}  # {quantity.text} [{quantity.unit}]")
+        lines.append(_said(f"{quantity.name} = {_number(program, quantity.name, value)}", _with_unit(quantity), 32))
     lines += ["", "# kept from scan to scan"]
     for quantity in program.states:
-        lines.append(f"#   {quantity.name:<12} {quantity.text} [{quantity.unit}]")
+        lines.append(f"#   {quantity.name:<12} {comment_text(_with_unit(quantity))}")
     lines += [
         f"INITIAL = [{', '.join(_initial(program))}]",
         "",
