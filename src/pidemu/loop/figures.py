@@ -28,6 +28,8 @@ SCANS_PER_TIME: Final = 20
 """By default, at least this many scans in the time in which the loop moves."""
 _PEAKS: Final = 4
 """So many peaks of a sensitivity are looked at."""
+_EDGE: Final = 1e10
+"""A sensitivity beyond this is one of a loop on the edge of stability, which rounding put on its stable side."""
 _RESOLUTION: Final = 4e-15
 """How near a frequency is found, as a share of it: a few units in the last place of its logarithm."""
 
@@ -66,7 +68,8 @@ def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = m
         return LoopFigures(process.is_stable, math.inf, math.inf, math.inf, math.nan, 1.0, 0.0, iae)
     picture = picture_of(loop)
     crossovers = _crossovers(loop, picture)
-    unstable = loop.unstable(picture, crossovers)
+    Ms, Mt = _largest(loop, picture, lambda x: 1 / np.abs(1 + x)), _largest(loop, picture, lambda x: np.abs(x / (1 + x)))
+    unstable = loop.unstable(picture, crossovers) or not Ms < _EDGE
     phases = np.angle(-loop(crossovers)) if crossovers.size else np.array([])  # from -180 degrees
     nearest = int(np.argmin(np.abs(phases))) if phases.size else -1
     delays = np.mod(phases, 2 * math.pi) / crossovers
@@ -80,8 +83,8 @@ def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = m
         phase_margin=math.degrees(phases[nearest]) if phases.size else math.inf,
         delay_margin=0.0 if unstable else float(min(delays, default=math.inf)),
         crossover=float(crossovers[nearest]) if phases.size else math.nan,
-        Ms=math.inf if unstable else max(_largest(loop, picture, lambda x: 1 / np.abs(1 + x)), float(at_infinity)),
-        Mt=math.inf if unstable else _largest(loop, picture, lambda x: np.abs(x / (1 + x))),
+        Ms=math.inf if unstable else max(Ms, float(at_infinity)),
+        Mt=math.inf if unstable else Mt,
         iae=iae,
     )
 
