@@ -180,7 +180,8 @@ def _interpolated(x1: Floats, x2: Floats, x3: Floats, f1: Floats, f2: Floats, f3
 def _crossovers(loop: OpenLoop, picture: Picture) -> Floats:
     """Return where the loop gain is 1 [rad/s]."""
     w, sizes = picture.all_sizes
-    return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
+    with np.errstate(divide="ignore"):  # nothing comes through a process with a zero at 0, as far down as floating point goes
+        return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
 
 
 def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
