@@ -51,7 +51,7 @@ class Quantity:
 
 GAIN: Final = Quantity("a gain that a loop has", "%/%", 1e-12, 1e12)
 TIME: Final = Quantity("a time that a loop has", "s", 1e-15, 1e15)
-RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-15, 1e15)
+RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-20, 1e20)
 LEVEL: Final = Quantity("a signal or a rate that a loop has", "%", 0.0, 1e40)
 RATIO: Final = Quantity("a ratio that a controller has", "", 1e-15, 1e15)
 ENDS: Final = Quantity("the end of a signal's range", "", 0.0, 1e15)

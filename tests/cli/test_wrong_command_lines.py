@@ -11,6 +11,7 @@ from tests.checks.bench import VALID, edited, written
 from tests.cli.helpers import Said, said
 
 _LINES = {
+    "code": "code [OPTIONS] CARD NAME=VALUE...",
     "convert": "convert [OPTIONS] [CARD] NAME=VALUE...",
     "run": "run [OPTIONS] CARD NAME=VALUE...",
     "show": "show [OPTIONS] CARD [NAME=VALUE]...",
@@ -122,17 +123,23 @@ RUNS = {
     f"run {_PI} --record empty": "empty: cannot be read: Is a directory",
     f"run {_PI} --record good.csv --scan 0": "scan interval 0 s is not a positive number",
     f"run {_PI} --record good.csv --scan inf": "scan interval is inf; give a finite number",
-    f"run {_PI} --record good.csv --limits 100,0": "'100,0' is not low and high; write the lower number first, such as 0,100",
     f"run {_PI} --record good.csv --bias 3": ("a bias belongs to a positional controller without integral action; leave it out"),
     f"run {_PI} --record good.csv --initial-output nan": "initial output is nan; give a finite number",
     "run generic/standard K=2 Ti=off --record good.csv --bias nan": "bias is nan; give a finite number",
     f"run {_PI} --record good.csv -o nowhere/out.csv": "nowhere/out.csv: cannot be written: No such file or directory",
     f"run {_PI} --record good.csv -o empty": "empty: cannot be written: Is a directory",
     f"code {_PI} --scan -1": "scan interval -1 s is not a positive number",
-    f"code {_PI} --limits 3,1": "'3,1' is not low and high; write the lower number first, such as 0,100",
 }
 
 USAGE = {
+    f"run {_PI} --record good.csv --limits 100,0": (
+        "run",
+        "Invalid value for '--limits': '100,0' is not low and high; write the lower number first, such as 0,100",
+    ),
+    f"code {_PI} --limits 3,1": (
+        "code",
+        "Invalid value for '--limits': '3,1' is not low and high; write the lower number first, such as 0,100",
+    ),
     "cards nothing-like": ("cards", "no card holds 'nothing-like'; 'pidemu cards' lists all"),
     "show": ("show", "Missing argument 'CARD'."),
     "convert": (

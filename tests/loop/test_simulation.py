@@ -305,9 +305,9 @@ def test_an_integral_that_does_not_settle_in_time_is_not_computed_and_the_certif
 ) -> None:
     moved = count_moves(monkeypatch)
     settings, slow = parallel(kp=1, ki=0.1), Process.from_lags(0.3, [1] * 20)
-    rows = loop_rows(compare_loops(settings, settings, slow, (0.02, 0.02)))
-    assert ["IAE, load step of 1 % [% s]", *["not computed: it settles too slowly"] * 2] in rows
-    assert 0 < len(moved) <= 2 * 200_000 // 50  # work goes with the square of 20 states
+    rows = loop_rows(compare_loops(settings, settings, slow, (0.2, 0.2)))
+    assert ["IAE, load step of 1 % [% s]", *["not computed: it takes too many scans"] * 2] in rows
+    assert len(moved) <= 2 * 100_000 // 20  # work goes with the square of 20 states
 
 
 @pytest.mark.parametrize("h", [0.1, 0.01, 0.001])
@@ -317,4 +317,4 @@ def test_the_iae_at_a_very_short_scan_interval_costs_no_more_than_at_a_longer_on
     moved = count_moves(monkeypatch)
     settings = pidemu.load_card("generic/standard").settings(K=1, Ti=1000)
     assert load_iae(settings, Process.from_lags(1, [1000], delay=100), h) == pytest.approx(1000, rel=1e-6)
-    assert len(moved) <= 200_000
+    assert len(moved) <= 100_000

@@ -160,6 +160,6 @@ def _four_digits(x: float, instead: str = "-") -> str:
 def loop_rows(loop: LoopComparison) -> list[list[str]]:
     """Return the closed loop's figures: name, before, after; an integral that was not settled in time is said to be open."""
     both = (loop.source, loop.target)
-    instead = {"iae": "not computed: it settles too slowly"}
+    instead = {"iae": "not computed: it takes too many scans"}
     rows = [[name, *(_four_digits(getattr(x, of), instead.get(of, "-")) for x in both)] for name, of in _LOOP_ROWS]
     return [*rows, ["stable", *("yes" if x.stable else "NO" for x in both)]]

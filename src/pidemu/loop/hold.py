@@ -93,8 +93,8 @@ class Plant:
     def __init__(self, model: SampledProcess) -> None:
         n = model.row.size
         self._on_the_way = deque([0.0] * model.scans)
-        self._step: list[list[float]] = np.column_stack([model.growth, model.early, model.late]).tolist()
-        self._row: list[float] = [*model.row.tolist(), model.through]
+        self._step = [_sparse(row) for row in np.column_stack([model.growth, model.early, model.late]).tolist()]
+        self._row = _sparse([*model.row.tolist(), model.through])
         self._states = [0.0] * n
         self._input = 0.0  # of d + 1 scans ago
 
@@ -111,10 +111,18 @@ class Plant:
         self._states = [0.0 if -TINY < x < TINY else x for x in moved]  # no denormal numbers (section 7)
 
 
-def _weighted(weights: Sequence[float], values: Sequence[float]) -> float:
+_Weights = list[tuple[int, float]]
+
+
+def _sparse(weights: Sequence[float]) -> _Weights:
+    """Return the places and sizes of weights that are not 0."""
+    return [(i, weight) for i, weight in enumerate(weights) if weight]
+
+
+def _weighted(weights: _Weights, values: Sequence[float]) -> float:
     total = 0.0
-    for weight, x in zip(weights, values, strict=True):  # in the order of the scan program; `sum` compensates in later Pythons
-        total += weight * x
+    for i, weight in weights:  # in the order of the scan program; `sum` compensates in later Pythons
+        total += weight * values[i]
     return total
 
 
