@@ -19,7 +19,6 @@ import numpy.typing as npt
 from pidemu.algorithm import Algorithm, Dahlin, Lag, check_filters
 from pidemu.card.base import Rule
 from pidemu.errors import ScanError, UndefinedError
-from pidemu.plausible import INTERVAL, plausible
 from pidemu.rational import Rational, Response, add, multiply
 from pidemu.series import hold, one_minus_delay
 
@@ -281,7 +280,6 @@ class Law:
         if self.scan is not None:
             if not (math.isfinite(self.scan) and self.scan > 0):
                 raise ScanError(f"scan interval {self.scan:g} s is not a positive number")
-            plausible("scan interval", self.scan, INTERVAL, ScanError)
             check_filters(self.algorithm, self.scan)
 
     @cached_property

@@ -15,7 +15,19 @@ from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, Quantity, number, shown
 from pidemu.ranges import RANGES, SignalRange, read_range
 from pidemu.settings import Settings, Value, limits, off_values, spans_of
-from pidemu.units import LEVELS, RATES, Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
+from pidemu.units import (
+    LEVELS,
+    RATES,
+    Dimension,
+    Role,
+    Spans,
+    Unit,
+    check_unit,
+    convert_unit,
+    is_reciprocal,
+    parse_quantity,
+    parse_unit,
+)
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
@@ -171,21 +183,32 @@ def _number(
     if written is None or written == unit:
         return amount, False, ""
     role = Role(setting.sets)
-    if role is Role.INTEGRAL and form is Form.PARALLEL and written.dimension in _PER_REPEAT and unit.dimension not in _PER_REPEAT:
-        raise SettingError(
-            f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
-            f"write {amount:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
-        )
+    _fit(role, written, unit)
     if written.scans != unit.scans:
         raise SettingError(
             f"'{given}' {'counts in scans' if written.scans else 'does not count in scans'}, this dial is in {unit.name}; "
             f"what that is depends on the scan interval: work it out and write it in {unit.name}"
+        )
+    if role is Role.INTEGRAL and form is Form.PARALLEL and written.dimension in _PER_REPEAT and unit.dimension not in _PER_REPEAT:
+        raise SettingError(
+            f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
+            f"write {amount:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
         )
     _need_ranges(written, unit, ranged)
     value = convert_unit(role, amount, written, unit, spans)
     inverted = is_reciprocal(role, written) != is_reciprocal(role, unit)
     how = f", the reciprocal, since the dial is in {unit.name}" if inverted else ""
     return value, True, f"{given.strip()} is {value:.6g} {unit.name}{how}"
+
+
+def _fit(role: Role, written: Unit, unit: Unit) -> None:
+    """Refuse a unit that cannot measure what the dial sets; where the dial counts in scans, only its own unit will do."""
+    try:
+        check_unit(role, written)
+    except UnitError as error:
+        if not unit.scans:
+            raise
+        raise SettingError(f"{str(error).partition('; use one of')[0]}; write it in {unit.name}") from None
 
 
 def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:

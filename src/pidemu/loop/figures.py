@@ -197,13 +197,18 @@ def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
         sizes.append(np.abs(values[:1]))
     if loop.law.scan is not None and values[-1].real < 0 and w[-1] >= math.pi / loop.law.scan * (1 - 1e-9):
         sizes.append(np.abs(values[-1:]))
-    factors = 1 / np.concatenate(sizes)
+    with np.errstate(divide="ignore"):  # nothing comes through
+        factors = 1 / np.concatenate(sizes)
     return float(factors[np.argmin(np.abs(np.log(factors)))]) if factors.size else math.inf
 
 
 def _largest(loop: OpenLoop, picture: Picture, of: Callable[[Response], Floats]) -> float:
     """Return the largest value of a function of the open loop: the highest peaks, each looked at more and more finely."""
-    w, found = picture.w, of(picture.values)
+    with np.errstate(divide="ignore", invalid="ignore"):  # on the edge of stability
+        return _highest_peak(loop, picture.w, of(picture.values), of)
+
+
+def _highest_peak(loop: OpenLoop, w: Floats, found: Floats, of: Callable[[Response], Floats]) -> float:
     padded = np.concatenate([[-math.inf], found, [-math.inf]])
     peaks = np.flatnonzero((found >= padded[:-2]) & (found >= padded[2:]))
     largest = float(found.max())

@@ -69,6 +69,11 @@ class SampledProcess:
         ----------
         w : array_like, shape (n,) or scalar
             Angular frequencies [rad/s], above zero, up to ``pi/h``.
+
+        Raises
+        ------
+        ProcessError
+            A time of the process is so long beside the scan interval that floating point cannot tell it from infinite.
         """
         at = np.atleast_1d(np.asarray(w, dtype=float))
         turn = np.exp(-1j * at * self.scan)  # z^-1
@@ -77,7 +82,13 @@ class SampledProcess:
         if self.row.size:
             left = rest[:, None, None] * np.eye(self.row.size) - self.growth
             right = self.late + self.early * turn[:, None]
-            found = found + np.linalg.solve(left, right[..., None])[..., 0] @ self.row
+            try:
+                found = found + np.linalg.solve(left, right[..., None])[..., 0] @ self.row
+            except np.linalg.LinAlgError:
+                raise ProcessError(
+                    f"times of the process are too far from the scan interval of {self.scan:g} s to compute with both; "
+                    f"leave out the lags that do not matter, or give another interval"
+                ) from None
         return np.asarray(found * np.exp(-1j * at * self.scan * self.scans), dtype=np.complex128).reshape(np.shape(w))
 
 
