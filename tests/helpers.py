@@ -73,7 +73,9 @@ def dial_values(draw: st.DrawFn, setting: Setting) -> float:
     if off and draw(st.integers(0, 7)) == 0:
         return draw(st.sampled_from(off))
     role = Role(setting.sets)
-    value = from_canonical(role, draw(_SENSIBLE[role]), parse_unit(setting.unit), Spans(scan=0.5))
+    sensible = draw(_SENSIBLE[role])
+    sensible = 0.0 if abs(sensible) < 1e-9 else sensible  # no controller has a gain or a time of 1e-200
+    value = from_canonical(role, sensible, parse_unit(setting.unit), Spans(scan=0.5))
     low, high = limits(setting)
     value = min(max(value, low), high)
     if setting.resolution is not None:

@@ -34,7 +34,7 @@ def test_a_raw_scale_may_say_what_it_stands_for() -> None:
     assert str(found) == "0 to 27648 counts (which is 0 to 300 degC)"
 
 
-@pytest.mark.parametrize("text", ["0,400 degC", "-50,150", "0.1,1e+300 bar", "0,27648 counts = -20,300 degC", "4,20 mA"])
+@pytest.mark.parametrize("text", ["0,400 degC", "-50,150", "0.1,1e+14 bar", "0,27648 counts = -20,300 degC", "4,20 mA"])
 def test_what_a_range_prints_as_an_argument_is_read_as_that_range(text: str) -> None:
     assert read_range(text).argument == text
     assert read_range(read_range(text).argument) == read_range(text)

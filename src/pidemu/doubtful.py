@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from math import isfinite
 
+from pidemu.card.base import Status
+from pidemu.card.load import EMULATION, Card
 from pidemu.card.stages import Faults
 from pidemu.errors import ScanError
+from pidemu.plausible import SIGNAL
 
 _DONE = {"hold": "output held", "propagate": "computed with", "nan": "output NaN", "zero": "output 0"}
 
 
-def bad_signal(faults: Faults, signals: Mapping[str, float]) -> str:
+def largest_signal(card: Card) -> float:
+    """Return the largest size of a signal that a card computes with; a larger one is a bad signal, as NaN and infinity are.
+
+    A program whose code is known does with any finite number what its code does. Of any other controller nobody knows what it does
+    with numbers that no signal reaches.
+    """
+    evidence = card.data.evidence.get(EMULATION)
+    known = evidence is not None and evidence.status in (Status.MEASURED, Status.DOCUMENTED)
+    return sys.float_info.max if card.data.kind == "software" and known else SIGNAL
+
+
+def bad_signal(faults: Faults, signals: Mapping[str, float], largest: float) -> str:
     """Return what is wrong with the signals of a scan and what the card does about it; empty where they are numbers.
 
     Parameters
@@ -20,8 +35,10 @@ def bad_signal(faults: Faults, signals: Mapping[str, float]) -> str:
         The card's policies.
     signals : mapping
         Signals by the names that people know them by.
+    largest : float
+        Size up to which a number is a signal.
     """
-    found = next(((name, value) for name, value in signals.items() if not isfinite(value)), None)
+    found = next(((name, value) for name, value in signals.items() if not abs(value) <= largest), None)
     return "" if found is None else f"{found[0]} is {found[1]}: {_DONE[faults.signal]}"
 
 

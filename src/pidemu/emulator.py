@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, isinf, isnan, nan
+from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,9 +13,10 @@ import numpy.typing as npt
 from pidemu.algorithm import Algorithm
 from pidemu.canonical import default_scan
 from pidemu.card.stages import Faults
-from pidemu.doubtful import bad_signal, usable_interval
+from pidemu.doubtful import bad_signal, largest_signal, usable_interval
 from pidemu.engines import Choice, Engine, checked, for_record
 from pidemu.errors import PidemuError, ScanError, suggest
+from pidemu.plausible import INTERVAL, LEVEL, SIGNAL, number, plausible, shown
 from pidemu.running import Running
 from pidemu.scan.build import Action, build
 from pidemu.scan.program import Program
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
 
 def _pair(limits: Sequence[float]) -> tuple[float, float]:
     try:
-        low, high = (float(x) for x in limits)
+        low, high = (number(x) for x in limits)
     except (TypeError, ValueError):
-        raise ScanError(f"output limits {limits!r} are not a pair of numbers such as (0, 100)") from None
+        raise ScanError(f"output limits {shown(limits)} are not a pair of numbers such as (0, 100)") from None
     return low, high
 
 
@@ -67,7 +68,8 @@ class Controller:
     program : Program
         The scan program.
     events : list of Event
-        Changes of mode with their bumps, changes of settings, and what was wrong with signals and intervals.
+        Changes of mode with their bumps, changes of settings, what was wrong with signals and intervals, and states that stopped
+        being finite numbers, as far as `run` and signals beyond 1e30 made them.
     engine : Choice
         Which back end the last `run` used, and why.
 
@@ -104,11 +106,12 @@ class Controller:
             names = settings.equation.action.names
             words = ", ".join(f"'{k}' ({v})" for k, v in names.items())
             raise ScanError(f"action is '{action}'; it is one of {words}")
-        self.interval = default_scan(settings.equation) if scan is None else float(scan)
+        self.interval = default_scan(settings.equation) if scan is None else plausible("scan interval", scan, INTERVAL, ScanError)
         self.events: list[Event] = []
         self._action: Action = "reverse" if settings.equation.action.fixed else action
         self._limits = _pair(settings.equation.output.limits if output_limits is None else output_limits)
-        self._bias, self._initial_output = float(bias), float(initial_output)
+        self._bias = plausible("bias", bias, LEVEL, ScanError)
+        self._initial_output = plausible("initial output", initial_output, LEVEL, ScanError)
         self._kept = 0.0  # what an integral held that was switched off while running
         self._signals: tuple[str, ...] = ()
         self._mode: Mode = "power-up"
@@ -120,9 +123,11 @@ class Controller:
         """Go on with settings and their program."""
         self.settings = settings
         self._faults = settings.equation.faults or Faults()
+        self._largest = largest_signal(settings.card)
         self._running = running
         self.program: Program = running.program
         self._scan, self._state = running.compiled.scan, running.state
+        self._lost = set(running.not_finite())
         self._know_the_everyday_scan()
 
     def _running_with(self, settings: Settings) -> Running:
@@ -168,6 +173,7 @@ class Controller:
             self._kept = 0.0
             self._use(self.settings, self._running_with(self.settings))
         self._running.reset()
+        self._lost = set(self._running.not_finite())
         self._mode, self._count, self._last = "power-up", 0, ()
         self.events.clear()
         self._know_the_everyday_scan()
@@ -219,8 +225,8 @@ class Controller:
         """
         if self._count:
             raise ScanError(f"a controller starts at rest before the first scan, and there have been {self._count}; reset() first")
-        if not (isfinite(sp) and isfinite(pv) and isfinite(output)):
-            raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers")
+        if not all(abs(x) <= self._largest for x in (sp, pv, output)):
+            raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
         last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
         self._running.take_over({"u": float(output)}, last)
         self._mode, self._last = "automatic", self._running.inputs(last)
@@ -315,7 +321,8 @@ class Controller:
         ----------
         sp, pv : float
             Setpoint and measurement [% of span; engineering units for a card with ``signals: engineering``]. What happens with NaN
-            and infinity is the card's (``faults.signal``); by default the output is held and `events` says so.
+            and infinity is the card's (``faults.signal``); by default the output is held and `events` says so. The same holds for
+            what is larger than any signal, beyond 1e30, except with software whose code is known.
         auto : bool
             Automatic; otherwise manual.
         manual : float, optional
@@ -347,7 +354,8 @@ class Controller:
         """
         everyday = self._plain and auto is True and manual is None and interval is None and not hold
         everyday = everyday and type(sp) is float and type(pv) is float
-        if everyday and cascade is track is external_reset is feedforward is None and isfinite(sp) and isfinite(pv):
+        usual = everyday and -SIGNAL <= sp <= SIGNAL and -SIGNAL <= pv <= SIGNAL
+        if usual and cascade is track is external_reset is feedforward is None:
             self._last = (sp, pv, 1.0, nan)
             self._count += 1
             return self._scan(self._state, sp, pv, 1.0, nan)
@@ -363,17 +371,30 @@ class Controller:
         if given:
             self._read(given)
         for name, value in (("manual", by_hand), *given.items()):
-            if name in FINITE and isinf(value):
-                raise ScanError(f"the {FINITE[name]} {value} is not a finite number")
+            if name in FINITE and abs(value) > self._largest:
+                raise ScanError(f"the {FINITE[name]} {value} is {self._beyond(value)}")
         signals = (
             absent(s) if s == "feedforward" and given.get(s) != given.get(s) else given.get(s, absent(s)) for s in self._names
         )
         inputs = (sp, pv, 1.0 if auto else 0.0, by_hand, *signals)
         mode = mode_of(auto, given)
-        bad = not (isfinite(sp) and isfinite(pv)) or isinf(given.get("cascade", nan))
+        bad = not (abs(sp) <= self._largest and abs(pv) <= self._largest) or abs(given.get("cascade", nan)) > self._largest
         if hold or interval is not None or bad:
             return self._odd_scan(mode, inputs, hold, interval)
         return self._scanned(self._running.compiled, mode, inputs)
+
+    @staticmethod
+    def _beyond(value: float) -> str:
+        """Return what is wrong with a signal that may not be infinite."""
+        return f"larger than any signal, {SIGNAL:g}" if isfinite(value) else "not a finite number"
+
+    def _note_lost(self, state: Sequence[float], scan: int) -> None:
+        """Note which states are no longer finite numbers from a scan on."""
+        found = self._running.not_finite(state)
+        new = [f"{name} = {x}" for name, x in found.items() if name not in self._lost]
+        if new:
+            self.events.append(Event(scan, "state", f"state no longer finite: {', '.join(new)}"))
+        self._lost = set(found)
 
     def _scanned(self, compiled: Compiled, mode: Mode, inputs: tuple[float, ...]) -> float:
         """Do one scan and note a change of mode."""
@@ -382,6 +403,7 @@ class Controller:
             u = float(compiled.scan(self._state, *inputs))
         if mode != self._mode:
             self._transfer(self._count, mode, u - was)
+        self._note_lost(self._state, self._count)
         self._last = inputs
         self._count += 1
         return u
@@ -422,13 +444,13 @@ class Controller:
         """Do a scan with a hold, a bad signal or an uneven interval."""
         if hold:
             return self._stand("hold", inputs)
-        if mode == "cascade" and not isfinite(inputs[0]):  # the local setpoint is not used
+        if mode == "cascade" and not abs(inputs[0]) <= self._largest:  # the local setpoint is not used
             inputs = (inputs[4 + self._names.index("cascade")], *inputs[1:])
         named = {"setpoint": inputs[0], "measurement": inputs[1]}
         if "cascade" in self._signals:
             remote = inputs[4 + self._names.index("cascade")]
             named["remote setpoint"] = 0.0 if isnan(remote) else remote  # none is none, and not a bad one
-        text, policy = bad_signal(self._faults, named), self._faults.signal
+        text, policy = bad_signal(self._faults, named, self._largest), self._faults.signal
         if text:
             self._note("signal", text)
         if text and policy != "propagate":
@@ -530,7 +552,11 @@ class Controller:
             signals["feedforward"] = np.where(np.isnan(signals["feedforward"]), 0.0, signals["feedforward"])
         for name, bad in (
             ("the mode is not a number", np.isnan(signals["auto"])),
-            *((f"the {text} is infinite", np.isinf(signals[s])) for s, text in FINITE.items() if s in signals),
+            *(
+                (f"the {text} is infinite or larger than any signal", np.abs(signals[s]) > self._largest)
+                for s, text in FINITE.items()
+                if s in signals
+            ),
         ):
             if bad.any():
                 raise ScanError(f"{name} in sample {np.flatnonzero(bad)[0]} (counted from 0)")
@@ -546,8 +572,8 @@ class Controller:
         out = np.empty(modes.size)
         self.engine = for_record(self.program, modes.size, self._forced)
         fast = self._running.runner(self.engine)
-        odd = (signals["hold"] > 0) | ~np.isfinite(signals["sp"]) | ~np.isfinite(signals["pv"])
-        odd |= np.isinf(signals.get("cascade", signals["sp"]))
+        odd = (signals["hold"] > 0) | ~(np.abs(signals["sp"]) <= self._largest) | ~(np.abs(signals["pv"]) <= self._largest)
+        odd |= np.abs(signals.get("cascade", signals["sp"])) > self._largest
         if measured:
             odd |= signals["interval"] != self.interval
         inputs = [signals[name] for name in ("sp", "pv", "auto", "manual", *self._names)]
@@ -564,7 +590,7 @@ class Controller:
 
     def _spell(self, fast: Runner, mode: Mode, out: Floats, inputs: list[Floats]) -> None:
         """Run a spell in one mode; in automatic, after its first scan, with the program specialised to that."""
-        was = self.output
+        was, before = self.output, list(self._state)
         with self._running.quiet():
             if mode in ("automatic", "cascade"):
                 out[0] = self._scan(self._state, *(float(s[0]) for s in inputs))
@@ -575,5 +601,16 @@ class Controller:
                 out[:] = fast.run(self._state, inputs, out.size)[0]
         if mode != self._mode:
             self._transfer(self._count, mode, float(out[0]) - was)
+        beyond = any(float(np.max(np.abs(s))) > SIGNAL for s in inputs[:2])
+        if beyond or self._running.not_finite().keys() != self._lost:
+            self._find_lost(before, inputs)
         self._last = tuple(float(s[-1]) for s in inputs)
         self._count += out.size
+
+    def _find_lost(self, before: Sequence[float], inputs: Sequence[Floats]) -> None:
+        """Note in which scans of a spell states stopped being finite numbers: do it again, from the states before, scan by scan."""
+        state = list(before)
+        with self._running.quiet():
+            for i, sample in enumerate(zip(*(s.tolist() for s in inputs), strict=True)):
+                self._scan(state, *sample)
+                self._note_lost(state, self._count + i)

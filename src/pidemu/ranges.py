@@ -6,11 +6,11 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import Any, Final, Literal
 
 from pidemu.errors import SettingError
 from pidemu.plain import exactly
+from pidemu.plausible import ENDS, SPAN, cut, number, number_in, shown
 
 Which = Literal["pv_range", "op_range"]
 
@@ -18,7 +18,7 @@ RANGES: Final[tuple[Which, ...]] = ("pv_range", "op_range")
 """The ranges of measurement and output, by the names that state them."""
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d+)?(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?|inf|nan)"
-_ENDS: Final = re.compile(rf"\s*({_NUMBER})\s*(?:,|\.\.|\bto\b)\s*({_NUMBER})(?![\d.])\s*([^,=]*?)\s*", re.IGNORECASE)
+_ENDS: Final = re.compile(rf"\s*({_NUMBER})\s*(?:,|\.\.|\bto\b)\s*({_NUMBER})(?![\d.])\s*([^,=]*?)\s*", re.IGNORECASE | re.ASCII)
 _SUCH: Final = 'low and high with a unit, such as "0,400 degC"'
 
 
@@ -92,33 +92,43 @@ def read_range(given: object) -> SignalRange:
     Raises
     ------
     SettingError
-        It is not a range: not two numbers, or the low end is not below the high end.
+        It is not a range: not two numbers, or the low end is not below the high end; or no signal has such a range.
     """
     if isinstance(given, SignalRange):
         return given
     found = _from_text(given) if isinstance(given, str) else _from_sequence(given)
     for part in (found, found.meaning):
-        if part is not None and not (math.isfinite(part.low) and math.isfinite(part.high) and part.low < part.high):
+        if part is None:
+            continue
+        if not (math.isfinite(part.low) and math.isfinite(part.high) and part.low < part.high):
             raise SettingError(f"{part} is not a range; give two finite numbers, low before high")
+        for x, quantity in ((part.low, ENDS), (part.high, ENDS), (part.span, SPAN)):
+            if not quantity.has(x):
+                raise SettingError(f"{part}: {quantity.refusal(f'{x:g}')}")
     return found
 
 
 def _from_text(text: str) -> SignalRange:
     parts = [_ENDS.fullmatch(part) for part in text.split("=")]
     if None in parts or len(parts) > 2:
-        raise SettingError(f"'{text}' is not a range; write {_SUCH}")
-    own, *meaning = (SignalRange(float(m[1]), float(m[2]), m[3]) for m in parts if m is not None)
+        raise SettingError(f"'{cut(text)}' is not a range; write {_SUCH}")
+    try:
+        own, *meaning = (SignalRange(number_in(m[1]), number_in(m[2]), m[3]) for m in parts if m is not None)
+    except ValueError as error:
+        raise SettingError(f"{error}; write {_SUCH}") from None
     return replace(own, meaning=meaning[0]) if meaning else own
 
 
 def _from_sequence(given: object) -> SignalRange:
     parts = list(given) if isinstance(given, Iterable) else []
     numbers, words = parts[:2], parts[2:]
-    if len(numbers) == 2 and len(words) <= 1 and all(isinstance(x, Real) and not isinstance(x, bool) for x in numbers):
-        unit = words[0] if words else ""
-        if isinstance(unit, str):
-            return SignalRange(float(numbers[0]), float(numbers[1]), unit.strip())
-    raise SettingError(f"'{given}' is not a range; give {_SUCH} or (0, 400, \"degC\")")
+    unit = words[0] if words else ""
+    if len(numbers) == 2 and len(words) <= 1 and isinstance(unit, str):
+        try:
+            return SignalRange(number(numbers[0]), number(numbers[1]), unit.strip())
+        except ValueError:
+            pass
+    raise SettingError(f"'{shown(given)}' is not a range; give {_SUCH} or (0, 400, \"degC\")")
 
 
 def option_of(which: Which, *, target: bool = False) -> str:

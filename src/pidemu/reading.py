@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from numbers import Real
 from typing import Final
 
 from pidemu.canonical import default_scan
@@ -13,12 +12,33 @@ from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
+from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, Quantity, number, shown
 from pidemu.ranges import RANGES, SignalRange, read_range
 from pidemu.settings import Settings, Value, limits, off_values, spans_of
-from pidemu.units import Dimension, Role, Spans, Unit, convert_unit, is_reciprocal, parse_quantity, parse_unit
+from pidemu.units import (
+    LEVELS,
+    RATES,
+    Dimension,
+    Role,
+    Spans,
+    Unit,
+    check_unit,
+    convert_unit,
+    is_reciprocal,
+    parse_quantity,
+    parse_unit,
+)
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
+_QUANTITIES: Final[dict[Role, Quantity]] = {
+    **dict.fromkeys((Role.GAIN, Role.MULTIPLIER, Role.PROCESS_GAIN, Role.FEEDFORWARD_GAIN), GAIN),
+    **dict.fromkeys((Role.DERIVATIVE, Role.FILTER_TIME, Role.TRACKING_TIME), TIME),
+    **dict.fromkeys((Role.PROCESS_TIME, Role.PROCESS_DELAY, Role.CLOSED_LOOP_TIME), TIME),
+    Role.INTEGRAL: RATE,
+    **dict.fromkeys((*LEVELS, *RATES), LEVEL),
+}
+"""What a dial's canonical value is; a ratio where nothing is stated."""
 _PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
 
 
@@ -119,7 +139,9 @@ def _read(
     unit = parse_unit(setting.unit)
     if given is None:
         if setting.default is not None:
-            return Value(name, setting, setting.default, unit.name, spans, given=False, active=active)
+            default = Value(name, setting, setting.default, unit.name, spans, given=False, active=active)
+            _check_size(default, f"the card's default, {shown(setting.default)} {unit.name},")
+            return default
         if not active:
             return None
         raise SettingError(f"missing; it {_purpose(setting)}, in {unit.name}")
@@ -147,36 +169,46 @@ def _number(
     given: object, setting: Setting, unit: Unit, spans: Spans, form: Form, ranged: tuple[bool, bool]
 ) -> tuple[float, bool, str]:
     """Return the dial's number, whether another unit was written, and the conversion in words."""
-    if isinstance(given, bool) or not isinstance(given, str | Real):
-        raise SettingError(f"'{given}' is not a number, nor a text such as \"20 {unit.name}\"")
-    if isinstance(given, Real):
+    if not isinstance(given, str):
         try:
-            return float(given), False, ""
-        except OverflowError:
-            raise SettingError(f"{str(given)[:12]}... is too large a number") from None
+            return number(given), False, ""
+        except ValueError as error:
+            such = f', nor a text such as "20 {unit.name}"' if "is not" in str(error) else ""
+            raise SettingError(f"{error}{such}") from None
     if given.strip().casefold() == "off":
         if not off_values(setting):
             raise SettingError("cannot be switched off: the card states no off value")
         return off_values(setting)[0], False, f"off is {off_values(setting)[0]:g} {unit.name}"
-    number, written = parse_quantity(given)
+    amount, written = parse_quantity(given)
     if written is None or written == unit:
-        return number, False, ""
+        return amount, False, ""
     role = Role(setting.sets)
-    if role is Role.INTEGRAL and form is Form.PARALLEL and written.dimension in _PER_REPEAT and unit.dimension not in _PER_REPEAT:
-        raise SettingError(
-            f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
-            f"write {number:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
-        )
+    _fit(role, written, unit)
     if written.scans != unit.scans:
         raise SettingError(
             f"'{given}' {'counts in scans' if written.scans else 'does not count in scans'}, this dial is in {unit.name}; "
             f"what that is depends on the scan interval: work it out and write it in {unit.name}"
         )
+    if role is Role.INTEGRAL and form is Form.PARALLEL and written.dimension in _PER_REPEAT and unit.dimension not in _PER_REPEAT:
+        raise SettingError(
+            f"'{given}' counts repeats of the proportional action, but this dial is a gain of its own, in {unit.name}; "
+            f"write {amount:g} {written.name.replace('repeat', '1').replace('/1', '')} if the gain is meant"
+        )
     _need_ranges(written, unit, ranged)
-    value = convert_unit(role, number, written, unit, spans)
+    value = convert_unit(role, amount, written, unit, spans)
     inverted = is_reciprocal(role, written) != is_reciprocal(role, unit)
     how = f", the reciprocal, since the dial is in {unit.name}" if inverted else ""
     return value, True, f"{given.strip()} is {value:.6g} {unit.name}{how}"
+
+
+def _fit(role: Role, written: Unit, unit: Unit) -> None:
+    """Refuse a unit that cannot measure what the dial sets; where the dial counts in scans, only its own unit will do."""
+    try:
+        check_unit(role, written)
+    except UnitError as error:
+        if not unit.scans:
+            raise
+        raise SettingError(f"{str(error).partition('; use one of')[0]}; write it in {unit.name}") from None
 
 
 def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:
@@ -195,7 +227,7 @@ def _need_ranges(written: Unit, unit: Unit, ranged: tuple[bool, bool]) -> None:
 def _check(value: Value, written: object) -> None:
     setting, unit = value.setting, value.unit
     unit = "" if unit == "1" else f" {unit}"
-    shown = f"{value.value:.6g}{unit}" + (f" (given as {written})" if written is not None else "")
+    words = f"{value.value:.6g}{unit}" + (f" (given as {written})" if written is not None else "")
     if math.isnan(value.value):
         raise SettingError("is not a number (NaN)")
     if value.off:
@@ -204,12 +236,23 @@ def _check(value: Value, written: object) -> None:
     if not low <= value.value <= high:
         allowed = f"{low:g} to {high:g}{unit}"
         off = off_values(setting)
-        raise SettingError(f"{shown} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
+        raise SettingError(f"{words} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
     if math.isinf(value.value):
         off = off_values(setting)
         does = f"; {off[0]:g} does" if off else ""
-        raise SettingError(f"{shown} is infinite, and infinity does not switch it off here{does}")
+        raise SettingError(f"{words} is infinite, and infinity does not switch it off here{does}")
     if value.value == 0 and is_reciprocal(value.role, parse_unit(value.unit)):
         off = off_values(setting)
         instead = f"{off[0]:g} switches it off" if off else "give the smallest value above zero, or another unit"
-        raise SettingError(f"{shown} would be infinite action; {instead}")
+        raise SettingError(f"{words} would be infinite action; {instead}")
+    _check_size(value, words)
+
+
+def _check_size(value: Value, words: str) -> None:
+    """Refuse a dial whose canonical value no controller has; what computes with it could not hold it."""
+    canonical, quantity = value.canonical, _QUANTITIES.get(value.role, RATIO)
+    if value.off or not value.value or math.isinf(value.value):
+        return
+    if not canonical or not quantity.has(canonical):
+        same = f"{canonical:.6g} {quantity.unit}".rstrip()
+        raise SettingError(quantity.refusal(words if same in words else f"{words} ({same})"))

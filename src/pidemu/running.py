@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from math import isnan, nan
+from math import isfinite, isnan, nan
 from typing import Any, Final
 
 import numpy as np
@@ -102,6 +102,10 @@ class Running:
     def named(self) -> dict[str, float]:
         """Return the states by name."""
         return {name: float(self.state[place]) for name, place in self._places.items()}
+
+    def not_finite(self, state: Sequence[float] | None = None) -> dict[str, float]:
+        """Return the states that are not finite numbers, by name; of these states, or of the present ones."""
+        return {name: float(x) for name, x in zip(self._places, state or self.state, strict=True) if not isfinite(x)}
 
     def inputs(self, last: Mapping[str, float]) -> tuple[float, ...]:
         """Return the program's inputs from signals by name; what is missing is no signal."""

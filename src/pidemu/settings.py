@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from pidemu.algorithm import Algorithm, Lag
 from pidemu.card.load import Card, Variant
 from pidemu.card.models import Equation, Setting
+from pidemu.errors import ScanError
+from pidemu.plausible import INTERVAL, plausible
 from pidemu.ranges import PERCENT, SignalRange
 from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
@@ -284,10 +286,16 @@ class Settings(Mapping[str, Value]):
         ----------
         scan : float, optional
             Scan interval [s], for the discrete law; without it the continuous one.
+
+        Raises
+        ------
+        ScanError
+            The interval is not one at which a controller is executed, or a filter is unstable at it.
         """
         from pidemu.law import Law  # the law is made from settings, not settings from the law
 
-        return Law(self.algorithm(scan=scan), scan)
+        h = None if scan is None else plausible("scan interval", scan, INTERVAL, ScanError)
+        return Law(self.algorithm(scan=h), h)
 
 
 def spans_of(pv: SignalRange | None, op: SignalRange | None, scan: float | None = None) -> Spans:

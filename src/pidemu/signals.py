@@ -27,7 +27,7 @@ FINITE: Final = {
     "external_reset": "external reset",
     "feedforward": "feedforward",
 }
-"""Signals that may be absent, and may not be infinite."""
+"""Signals that may be absent, and may not be infinite or larger than any signal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,9 @@ class Event:
     ----------
     scan : int
         Which scan, counted from 0.
-    kind : {"transfer", "settings", "signal", "interval"}
-        A change of mode, of settings, a signal that is not a number, or a scan interval that is not positive.
+    kind : {"transfer", "settings", "signal", "interval", "state"}
+        A change of mode, of settings, a signal that is not a number, a scan interval that is not positive, or a state that is no
+        longer a finite number.
     text : str
         What happened.
     bump : float
@@ -49,7 +50,7 @@ class Event:
     """
 
     scan: int
-    kind: Literal["transfer", "settings", "signal", "interval"]
+    kind: Literal["transfer", "settings", "signal", "interval", "state"]
     text: str
     bump: float = 0.0
     scans: int = 1
@@ -94,7 +95,10 @@ def broadcast(columns: Sequence[npt.ArrayLike]) -> list[Floats]:
     ScanError
         They have different lengths, or more dimensions.
     """
-    arrays = [np.asarray(c, dtype=float) for c in columns]
+    try:
+        arrays = [np.asarray(c, dtype=float) for c in columns]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ScanError(f"a signal is not made of numbers: {error}") from None
     try:
         signals = np.broadcast_arrays(*(np.atleast_1d(a) for a in arrays))
     except ValueError:

@@ -33,6 +33,7 @@ from functools import cache
 from typing import Any, Final
 
 from pidemu.errors import UnitError, suggest
+from pidemu.plausible import cut, number_in
 
 
 class Dimension(StrEnum):
@@ -204,7 +205,9 @@ _WORDS: Final = {
     "degc": "degC", "°c": "degC", "celsius": "degC", "degf": "degF", "°f": "degF", "fahrenheit": "degF",
 }  # fmt: skip
 _WHOLE: Final = {"rpm": "repeat/min", "psi/in": "eu/eu", "psi/inch": "eu/eu"}
-_NUMBER: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|inf(?:inity)?|nan))\s*(.*?)\s*$", re.I)
+_NUMBER: Final = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|inf(?:inity)?|nan))\s*(.*?)\s*$", re.I | re.A
+)
 
 _TIMELIKE: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _ACCEPTED: Final[dict[Role, tuple[Dimension, ...]]] = {
@@ -255,15 +258,18 @@ def parse_quantity(text: str) -> tuple[float, Unit | None]:
     Raises
     ------
     UnitError
-        There is no number, a decimal comma is used, or the unit is not known.
+        There is no number, it is too large or too small, a decimal comma is used, or the unit is not known.
     """
     match = _NUMBER.match(text)
     if match is None:
-        raise UnitError(f"'{text}' is not a number, nor a number with a unit such as \"20 s/repeat\"")
+        raise UnitError(f"'{cut(text)}' is not a number, nor a number with a unit such as \"20 s/repeat\"")
     number, unit = match.groups()
     if unit.startswith(","):
-        raise UnitError(f"'{text}' has a comma; write a decimal point")
-    return float(number), parse_unit(unit) if unit else None
+        raise UnitError(f"'{cut(text)}' has a comma; write a decimal point")
+    try:
+        return number_in(number), parse_unit(unit) if unit else None
+    except ValueError as error:
+        raise UnitError(str(error)) from None
 
 
 def _constant(role: Role, unit: Unit, spans: Spans) -> Fraction:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
 from pidemu.errors import SettingError, UnitError
+from pidemu.plausible import cut, number_in
 from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
@@ -34,17 +36,19 @@ def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAI
 
 
 def pair(text: str) -> tuple[float, float]:
-    """Read two numbers with a comma between, such as ``0,200``.
+    """Read two numbers with a comma between, the lower one first, such as ``0,200``.
 
     Raises
     ------
     SettingError
-        They are not two numbers.
+        They are not two numbers, or the first is not the lower one.
     """
     try:
-        low, high = (float(x) for x in text.split(","))
+        low, high = (number_in(x) for x in text.split(","))
     except ValueError:
-        raise SettingError(f"'{text}' is not two numbers such as 0,200") from None
+        raise SettingError(f"'{cut(text)}' is not two numbers such as 0,200") from None
+    if not low < high:  # not a number compares false as well
+        raise SettingError(f"'{cut(text)}' is not low and high; write the lower number first, such as 0,100")
     return low, high
 
 
@@ -60,7 +64,7 @@ def seconds(text: str) -> float:
         number, unit = parse_quantity(text.strip())
         return number if unit is None else to_canonical(Role.PROCESS_TIME, number, unit)
     except UnitError:
-        raise SettingError(f"'{text}' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
+        raise SettingError(f"'{cut(text)}' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
 
 
 def step(text: str) -> float | tuple[float, float]:
@@ -73,6 +77,11 @@ def step(text: str) -> float | tuple[float, float]:
     """
     when, comma, size = text.rpartition(",")
     try:
-        return (seconds(when), float(size)) if comma else float(text)
+        found = (seconds(when), number_in(size)) if comma else (0.0, number_in(text))
+        if not all(map(math.isfinite, found)):
+            raise ValueError
     except (ValueError, SettingError):
-        raise SettingError(f"'{text}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5") from None
+        raise SettingError(
+            f"'{cut(text)}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
+        ) from None
+    return found if comma else found[1]

@@ -11,6 +11,7 @@ from tests.checks.bench import VALID, edited, written
 from tests.cli.helpers import Said, said
 
 _LINES = {
+    "code": "code [OPTIONS] CARD NAME=VALUE...",
     "convert": "convert [OPTIONS] [CARD] NAME=VALUE...",
     "run": "run [OPTIONS] CARD NAME=VALUE...",
     "show": "show [OPTIONS] CARD [NAME=VALUE]...",
@@ -121,18 +122,24 @@ RUNS = {
     f"run {_PI} --record none.csv": "none.csv: cannot be read: No such file or directory",
     f"run {_PI} --record empty": "empty: cannot be read: it is a folder",
     f"run {_PI} --record good.csv --scan 0": "scan interval 0 s is not a positive number",
-    f"run {_PI} --record good.csv --scan inf": "scan interval inf s is not a positive number",
-    f"run {_PI} --record good.csv --limits 100,0": "output limits 100 to 0 are not a range; give low, then high",
+    f"run {_PI} --record good.csv --scan inf": "scan interval is inf; give a finite number",
     f"run {_PI} --record good.csv --bias 3": ("a bias belongs to a positional controller without integral action; leave it out"),
-    f"run {_PI} --record good.csv --initial-output nan": "the initial output nan is not a finite number",
-    "run generic/standard K=2 Ti=off --record good.csv --bias nan": "the bias nan is not a finite number",
+    f"run {_PI} --record good.csv --initial-output nan": "initial output is nan; give a finite number",
+    "run generic/standard K=2 Ti=off --record good.csv --bias nan": "bias is nan; give a finite number",
     f"run {_PI} --record good.csv -o nowhere/out.csv": "nowhere/out.csv: cannot be written: No such file or directory",
     f"run {_PI} --record good.csv -o empty": "empty: cannot be written: it is a folder",
     f"code {_PI} --scan -1": "scan interval -1 s is not a positive number",
-    f"code {_PI} --limits 3,1": "output limits 3 to 1 are not a range; give low, then high",
 }
 
 USAGE = {
+    f"run {_PI} --record good.csv --limits 100,0": (
+        "run",
+        "Invalid value for '--limits': '100,0' is not low and high; write the lower number first, such as 0,100",
+    ),
+    f"code {_PI} --limits 3,1": (
+        "code",
+        "Invalid value for '--limits': '3,1' is not low and high; write the lower number first, such as 0,100",
+    ),
     "cards nothing-like": ("cards", "no card holds 'nothing-like'; 'pidemu cards' lists all"),
     "show": ("show", "Missing argument 'CARD'."),
     "convert": (

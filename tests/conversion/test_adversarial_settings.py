@@ -289,7 +289,7 @@ def test_one_cards_off_value_typed_into_another_card_is_no_infinite_action(
         load(card, **dials, **{name: value})
 
 
-SCALES = [1e-100, 1e-9, 1e-6, 1e6, 1e9, 1e100]
+SCALES = [1e-9, 1e-6, 1e6, 1e9]
 
 
 @pytest.mark.parametrize("size", SCALES)

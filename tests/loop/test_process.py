@@ -215,7 +215,7 @@ def test_a_process_is_read_from_a_line_of_text(text: str, process: Process) -> N
         ("gain=2 eu/eu", "gain=2 eu/eu: a process gain is in %/%.*convert it"),
         ("gain=big", "gain=big: 'big' is not a number"),
         ("gain=1,pole=left", r"pole=left is not a number \[rad/s\] such as"),
-        ("gain=1,integrators=half", "integrators is half; give how many"),
+        ("gain=1,integrators=half", "integrators is 'half'; give how many"),
         ("gain=0,lag=1", "the gain is 0"),
     ],
 )

@@ -13,9 +13,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.certificate.figures import loop_rows
 from pidemu.engines import Choice
 from pidemu.errors import ProcessError, UndefinedError
 from pidemu.loop.figures import loop_figures, scan_for
+from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
 from pidemu.loop.process import Process
 from pidemu.loop.simulation import Simulation, compare_loops, simulate
@@ -29,6 +31,19 @@ FOPDT = Process.from_lags(1, [10], delay=2)
 
 def parallel(**dials: float) -> Settings:
     return pidemu.load_card("generic/parallel").settings({"kp": 0.0, "ki": 0.0, "kd": 0.0, **dials})
+
+
+def count_moves(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """What is simulated from now on, scan by scan."""
+    moved: list[float] = []
+    move = Plant.move
+
+    def counted(plant: Plant, u: float) -> None:
+        moved.append(u)
+        move(plant, u)
+
+    monkeypatch.setattr(Plant, "move", counted)
+    return moved
 
 
 def in_turns(s: Settings, process: Process, h: float, scans: int, sp: Floats, load: Floats) -> tuple[Floats, Floats]:
@@ -231,11 +246,11 @@ def test_a_recursion_in_scans_is_compared_at_its_scans_only() -> None:
     ("change", "message"),
     [
         ({"time": 0}, "a simulation of 0 s.*give a time"),
-        ({"time": math.inf}, "a simulation of inf s.*give a time"),
+        ({"time": math.inf}, "time is inf; give a finite number"),
         ({"time": 1e9}, "cannot be run; give a time of a few responses"),
         ({"time": 100, "load": (200, 5)}, "a load step of 5 % at 200 s is not within the 100 s simulated; start it earlier"),
         ({"setpoint": (-1, 5)}, "a setpoint step of 5 % at -1 s"),
-        ({"setpoint": math.nan}, "a setpoint step of nan %"),
+        ({"setpoint": math.nan}, "the size of the setpoint step is nan; give a finite number"),
         ({"setpoint": "up"}, "setpoint is 'up'; give the size"),
         ({"load": (1, 2, 3)}, r"load is \(1, 2, 3\); give the size"),
         ({"output_limits": (0, 40)}, "the initial output 50 % is outside the output limits 0 to 40 %; give another"),
@@ -266,3 +281,40 @@ def test_an_iae_that_no_sampling_can_show_is_not_a_number() -> None:
     process = Process.from_lags(1, [1])
     assert math.isnan(continuous_load_iae(settings, process))
     assert not loop_figures(settings.law(1e-4), process).stable
+
+
+@pytest.mark.parametrize("process", [Process.from_lags(1, integrators=1), Process(1, [0])], ids=["integrators=1", "pole=0"])
+@pytest.mark.parametrize("h", [1.0, 0.5, 2.0])
+def test_the_iae_of_an_integrating_process_that_a_scan_brings_back_at_once(process: Process, h: float) -> None:
+    """The gain is 1/h: the proportional action alone brings the measurement back within one scan; nothing is read in the first."""
+    settings = parallel(kp=1 / h, ki=0.1 / h)
+    assert load_iae(settings, process, h) == pytest.approx(10 * h, rel=1e-6)  # 1/ki
+
+
+def test_a_loop_on_the_edge_of_stability_is_not_stable_and_costs_nothing() -> None:
+    settings, process = pidemu.load_card("generic/standard").settings(K=1, Ti=10), Process(1, [1])
+    for h in (None, 1.0, 2.0):  # 10 s^2 + 1: poles on the imaginary axis
+        figures = loop_figures(settings.law(h), process)
+        assert (False, math.inf, math.inf) == (figures.stable, figures.Ms, figures.Mt)
+        assert abs(figures.phase_margin) < 1e-9
+    assert load_iae(settings, process, 2.0) == math.inf
+
+
+def test_an_integral_that_does_not_settle_in_time_is_not_computed_and_the_certificate_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    moved = count_moves(monkeypatch)
+    settings, slow = parallel(kp=1, ki=0.1), Process.from_lags(0.3, [1] * 20)
+    rows = loop_rows(compare_loops(settings, settings, slow, (0.2, 0.2)))
+    assert ["IAE, load step of 1 % [% s]", *["not computed: it takes too many scans"] * 2] in rows
+    assert len(moved) <= 2 * 100_000 // 20  # work goes with the square of 20 states
+
+
+@pytest.mark.parametrize("h", [0.1, 0.01, 0.001])
+def test_the_iae_at_a_very_short_scan_interval_costs_no_more_than_at_a_longer_one(
+    h: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = count_moves(monkeypatch)
+    settings = pidemu.load_card("generic/standard").settings(K=1, Ti=1000)
+    assert load_iae(settings, Process.from_lags(1, [1000], delay=100), h) == pytest.approx(1000, rel=1e-6)
+    assert len(moved) <= 100_000

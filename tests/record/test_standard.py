@@ -156,7 +156,7 @@ def test_the_same_call_gives_the_same_bits() -> None:
     ("arguments", "message"),
     [
         ({"scan": 0.0}, "scan interval 0 of the standard record is not a positive number"),
-        ({"scan": 1.0, "time": math.inf}, "time inf of the standard record is not a positive number"),
+        ({"scan": 1.0, "time": math.inf}, "time is inf; give a finite number"),
         ({"scan": 1.0, "size": -1.0}, "size -1 of the standard record is not a positive number"),
         ({"scan": 1e-6}, "a standard record with time 60 s, scanned every 1e-06 s, is too long; use a longer interval"),
     ],

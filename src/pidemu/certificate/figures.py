@@ -153,12 +153,13 @@ def textbook_line(c: Conversion) -> str:
     return f"the textbook rule would deviate by {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band"
 
 
-def _four_digits(x: float) -> str:
-    return "-" if math.isnan(x) else number(x, 4)
+def _four_digits(x: float, instead: str = "-") -> str:
+    return instead if math.isnan(x) else number(x, 4)
 
 
 def loop_rows(loop: LoopComparison) -> list[list[str]]:
-    """Return the closed loop's figures: name, before, after."""
+    """Return the closed loop's figures: name, before, after; an integral that was not settled in time is said to be open."""
     both = (loop.source, loop.target)
-    rows = [[name, *(_four_digits(getattr(x, attribute)) for x in both)] for name, attribute in _LOOP_ROWS]
+    instead = {"iae": "not computed: it takes too many scans"}
+    rows = [[name, *(_four_digits(getattr(x, of), instead.get(of, "-")) for x in both)] for name, of in _LOOP_ROWS]
     return [*rows, ["stable", *("yes" if x.stable else "NO" for x in both)]]

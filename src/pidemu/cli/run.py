@@ -28,7 +28,7 @@ from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.files.writing import beside, check
 from pidemu.plain import json_safe
 from pidemu.record.files import Floats, Record, read_record, write_record
-from pidemu.record.playback import Playback, Timing, play, timing
+from pidemu.record.playback import Playback, Timing, far_out, play, timing
 from pidemu.scan.build import Action
 
 
@@ -193,7 +193,8 @@ def _write(record: Record, emulated: Floats, target: str | None, inputs: tuple[s
 def _notes(
     record: Record, controller: Controller, when: Timing, bias: float, limits: tuple[float, float], action: Action
 ) -> Iterator[str]:
-    """Yield what was taken for granted."""
+    """Yield what was taken for granted, and what cannot be a signal."""
+    yield from far_out(record)
     if when.scan is None:
         default = f"{number(controller.interval)} s"
         yield f"the scan interval is the card's default, {default}: the record has no time column, and --scan is not given"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pidemu.record.files import Floats, Record
-from pidemu.record.playback import Playback, play
+from pidemu.record.playback import Playback, far_out, play
 from pidemu.record.sampling import Scale, controller_for, sampled
 from pidemu.record.standard import Segment
 from pidemu.scan.build import Action
@@ -166,6 +166,11 @@ def common_notes(runs: Sequence[Run], path: str | Path, default: float | None) -
         names = ", ".join(run.label for run in plain)
         yield f"computed in engineering units, of which 0 to 100 is taken for the span: {names}"
     first = runs[0].record
+    yield from far_out(first)
+    for run in runs:
+        lost = next((e for e in run.playback.events if e.kind == "state"), None)
+        if lost is not None:
+            yield f"{run.label}: {lost.text}, in scan {lost.scan} (counted from 0)"
     if default is not None and first.time is None and first.interval is None:
         yield f"{path} has no time column; its lines are taken to be {default:g} s apart"
     by_hand = first.auto is not None and bool((first.auto == 0).any())

@@ -32,7 +32,6 @@ from pidemu.conversion.options import Attempt, attempts
 from pidemu.conversion.questions import Question
 from pidemu.conversion.refusals import (
     forgotten_output,
-    refuse_absurd_gains,
     refuse_positive_feedback,
     refuse_recursions,
     refuse_two_intervals,
@@ -177,7 +176,6 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     """Return the conversion that a request asks for; see `convert`."""
     aim = _aim(request.match, request.process)
     refuse_recursions(source, card)
-    refuse_absurd_gains(source)
     opens = tuple(unstated(source))
     source = _paced(source, request).at_scan(request.declared[0] if request.declared else None)
     open_questions = [o.question for o in opens if o.asked]

@@ -14,9 +14,6 @@ from pidemu.errors import ConversionRefusedError, ScanError, SettingError
 from pidemu.settings import Settings, off_values
 from pidemu.units import Role
 
-_SMALLEST, _LARGEST = 1e-120, 1e120
-"""Gains beyond these are mistakes, and their squares leave the range of floating point."""
-
 
 def forgotten_output(source: Settings, settings: Settings, request: Request, factor: float) -> str:
     """Return why a target cannot hold what the source held at a limit; empty where it can, or where an integral makes up for it."""
@@ -75,14 +72,6 @@ def refuse_positive_feedback(source: Settings, request: Request) -> None:
             f"{source.card.id}: {action} acting with the process {request.process.text} is positive feedback: the loop runs away. "
             f"Turn the sign of the process gain, or of the action: this process needs {needed} acting"
         )
-
-
-def refuse_absurd_gains(source: Settings) -> None:
-    """Refuse gains that no controller has."""
-    a = source.algorithm()
-    for name, gain in (("proportional", a.kp), ("integral", a.ki), ("derivative", a.kd)):
-        if gain and not _SMALLEST < abs(gain) < _LARGEST:
-            raise SettingError(f"{source.card.id}: {gain:g} is not a {name} gain that a controller has; check the settings")
 
 
 def refuse_two_intervals(source: Settings, settings: Settings, request: Request) -> None:

@@ -16,6 +16,7 @@ from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
 from pidemu.loop.text import written
 from pidemu.plain import exactly
+from pidemu.plausible import INTERVAL, LEVEL, number, plausible, shown
 from pidemu.ranges import RANGES, SignalRange, option_of, read_range
 from pidemu.reading import signal_range
 from pidemu.scan.build import Action
@@ -139,8 +140,6 @@ class Request:
         yield from (flag for flag, wanted in flags.items() if wanted)
 
 
-_SHORTEST, _LONGEST = 1e-9, 1e9
-"""Intervals beyond these are mistakes, and what is computed from them leaves the range of floating point [s]."""
 _OUTPUT = (-10.0, 110.0)
 """Between these an output lies [% of span]: the usual limits leave 5 to 10 % beyond the range."""
 DIGITS = 5
@@ -235,16 +234,25 @@ def _intervals_of(scan: object, runs_every: object) -> tuple[tuple[float, float]
 
 
 def _checked_bias(bias: float | None) -> float | None:
-    low, high = _OUTPUT
-    if bias is not None and not low <= bias <= high:  # not a number compares false as well
-        raise SettingError(f"bias is {bias:g} %; it is the output at SP = PV, between {low:g} and {high:g} % of its span")
-    return bias
+    if bias is None:
+        return None
+    (low, high), found = _OUTPUT, plausible("bias", bias, LEVEL, SettingError)
+    if not low <= found <= high:
+        raise SettingError(f"bias is {found:g} %; it is the output at SP = PV, between {low:g} and {high:g} % of its span")
+    return found
 
 
 def _checked_limits(limits: tuple[float, float] | None) -> tuple[float, float] | None:
-    if limits is not None and not limits[0] < limits[1]:  # not a number compares false as well
-        raise SettingError(f"limits are {limits[0]:g} and {limits[1]:g}; give the lower limit first, such as 0,100")
-    return limits
+    if limits is None:
+        return None
+    try:
+        low, high = limits
+    except (TypeError, ValueError):
+        raise SettingError(f"limits are {shown(limits)}; give two numbers, such as (0, 100)") from None
+    found = tuple(plausible("limits", x, LEVEL, SettingError) for x in (low, high))
+    if not found[0] < found[1]:
+        raise SettingError(f"limits are {found[0]:g} and {found[1]:g}; give the lower limit first, such as 0,100")
+    return found[0], found[1]
 
 
 def _ratio(real: float, declared: float) -> float:
@@ -258,15 +266,13 @@ def _one_or_two(given: object, name: str) -> tuple[float, ...] | None:
         return None
     found: tuple[float, ...] = ()
     try:
-        if isinstance(given, Real) and not isinstance(given, bool):
-            found = (float(given),)
-        elif not isinstance(given, bool | str):
-            found = tuple(float(h) for h in given)  # type: ignore[attr-defined]
+        if isinstance(given, tuple | list):
+            found = tuple(number(h) for h in given)
             found = found if len(found) == 2 else ()
-    except (TypeError, ValueError):
+        else:
+            found = (number(given),)
+    except ValueError:
         found = ()
     if not found or not all(math.isfinite(h) and h > 0 for h in found):
-        raise ScanError(f"{name} is {given!r}; it is a positive interval in seconds, or two: (1.0, 0.5)")
-    if not all(_SHORTEST <= h <= _LONGEST for h in found):
-        raise ScanError(f"{name} is {given!r}; no controller is executed at such intervals, which are in seconds")
-    return found
+        raise ScanError(f"{name} is {shown(given)}; it is a positive interval in seconds, or two: (1.0, 0.5)")
+    return tuple(plausible(name, h, INTERVAL, ScanError) for h in found)

@@ -9,6 +9,7 @@ from typing import Final
 
 from pidemu.certificate.models import Rounded
 from pidemu.errors import SettingError
+from pidemu.plausible import shown
 from pidemu.settings import Settings, Value, limits, off_values
 from pidemu.units import Role, is_reciprocal, parse_unit
 
@@ -27,7 +28,7 @@ def checked_digits(digits: object) -> int | None:
     if digits is None:
         return None
     if not isinstance(digits, int) or isinstance(digits, bool) or not 1 <= digits <= 17:
-        raise SettingError(f"digits is {digits!r}; it is a whole number from 1 to 17")
+        raise SettingError(f"digits is {shown(digits)}; it is a whole number from 1 to 17")
     return digits
 
 

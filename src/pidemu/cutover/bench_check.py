@@ -137,6 +137,8 @@ def _moved(settings: Settings, h: float, action: Action, step: float) -> _Move:
     ramp = float(u[-1] - u[wait - 1]) / watched if a.ki or a.dahlin else 0.0
     scans = np.arange(u.size) + _SHARE.get(a.integral_rule, 1.0) - a.previous_pv
     level = u - ramp * scans
+    if not np.isfinite(level).all():
+        raise ScanError("gain or derivative is so large that a step of PV takes the output beyond all numbers")
     jump = _clean(float(level[wait - 1]), step)
     kick, settles = _kick(u[:wait], level[:wait] - jump, jump, h) if a.kd else (0.0, 0.0)
     return _Move(jump, kick, settles, _clean(ramp * 60 / h, step))

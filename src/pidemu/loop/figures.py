@@ -28,6 +28,8 @@ SCANS_PER_TIME: Final = 20
 """By default, at least this many scans in the time in which the loop moves."""
 _PEAKS: Final = 4
 """So many peaks of a sensitivity are looked at."""
+_EDGE: Final = 1e10
+"""A sensitivity beyond this is one of a loop on the edge of stability, which rounding put on its stable side."""
 _RESOLUTION: Final = 4e-15
 """How near a frequency is found, as a share of it: a few units in the last place of its logarithm."""
 
@@ -66,7 +68,8 @@ def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = m
         return LoopFigures(process.is_stable, math.inf, math.inf, math.inf, math.nan, 1.0, 0.0, iae)
     picture = picture_of(loop)
     crossovers = _crossovers(loop, picture)
-    unstable = loop.unstable(picture, crossovers)
+    Ms, Mt = _largest(loop, picture, lambda x: 1 / np.abs(1 + x)), _largest(loop, picture, lambda x: np.abs(x / (1 + x)))
+    unstable = loop.unstable(picture, crossovers) or not Ms < _EDGE
     phases = np.angle(-loop(crossovers)) if crossovers.size else np.array([])  # from -180 degrees
     nearest = int(np.argmin(np.abs(phases))) if phases.size else -1
     delays = np.mod(phases, 2 * math.pi) / crossovers
@@ -80,8 +83,8 @@ def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = m
         phase_margin=math.degrees(phases[nearest]) if phases.size else math.inf,
         delay_margin=0.0 if unstable else float(min(delays, default=math.inf)),
         crossover=float(crossovers[nearest]) if phases.size else math.nan,
-        Ms=math.inf if unstable else max(_largest(loop, picture, lambda x: 1 / np.abs(1 + x)), float(at_infinity)),
-        Mt=math.inf if unstable else _largest(loop, picture, lambda x: np.abs(x / (1 + x))),
+        Ms=math.inf if unstable else max(Ms, float(at_infinity)),
+        Mt=math.inf if unstable else Mt,
         iae=iae,
     )
 
@@ -177,7 +180,8 @@ def _interpolated(x1: Floats, x2: Floats, x3: Floats, f1: Floats, f2: Floats, f3
 def _crossovers(loop: OpenLoop, picture: Picture) -> Floats:
     """Return where the loop gain is 1 [rad/s]."""
     w, sizes = picture.all_sizes
-    return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
+    with np.errstate(divide="ignore"):  # nothing comes through a process with a zero at 0, as far down as floating point goes
+        return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
 
 
 def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
@@ -193,13 +197,18 @@ def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
         sizes.append(np.abs(values[:1]))
     if loop.law.scan is not None and values[-1].real < 0 and w[-1] >= math.pi / loop.law.scan * (1 - 1e-9):
         sizes.append(np.abs(values[-1:]))
-    factors = 1 / np.concatenate(sizes)
+    with np.errstate(divide="ignore"):  # nothing comes through
+        factors = 1 / np.concatenate(sizes)
     return float(factors[np.argmin(np.abs(np.log(factors)))]) if factors.size else math.inf
 
 
 def _largest(loop: OpenLoop, picture: Picture, of: Callable[[Response], Floats]) -> float:
     """Return the largest value of a function of the open loop: the highest peaks, each looked at more and more finely."""
-    w, found = picture.w, of(picture.values)
+    with np.errstate(divide="ignore", invalid="ignore"):  # on the edge of stability
+        return _highest_peak(loop, picture.w, of(picture.values), of)
+
+
+def _highest_peak(loop: OpenLoop, w: Floats, found: Floats, of: Callable[[Response], Floats]) -> float:
     padded = np.concatenate([[-math.inf], found, [-math.inf]])
     peaks = np.flatnonzero((found >= padded[:-2]) & (found >= padded[2:]))
     largest = float(found.max())

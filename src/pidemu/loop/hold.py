@@ -69,6 +69,11 @@ class SampledProcess:
         ----------
         w : array_like, shape (n,) or scalar
             Angular frequencies [rad/s], above zero, up to ``pi/h``.
+
+        Raises
+        ------
+        ProcessError
+            A time of the process is so long beside the scan interval that floating point cannot tell it from infinite.
         """
         at = np.atleast_1d(np.asarray(w, dtype=float))
         turn = np.exp(-1j * at * self.scan)  # z^-1
@@ -77,7 +82,13 @@ class SampledProcess:
         if self.row.size:
             left = rest[:, None, None] * np.eye(self.row.size) - self.growth
             right = self.late + self.early * turn[:, None]
-            found = found + np.linalg.solve(left, right[..., None])[..., 0] @ self.row
+            try:
+                found = found + np.linalg.solve(left, right[..., None])[..., 0] @ self.row
+            except np.linalg.LinAlgError:
+                raise ProcessError(
+                    f"times of the process are too far from the scan interval of {self.scan:g} s to compute with both; "
+                    f"leave out the lags that do not matter, or give another interval"
+                ) from None
         return np.asarray(found * np.exp(-1j * at * self.scan * self.scans), dtype=np.complex128).reshape(np.shape(w))
 
 
@@ -93,8 +104,8 @@ class Plant:
     def __init__(self, model: SampledProcess) -> None:
         n = model.row.size
         self._on_the_way = deque([0.0] * model.scans)
-        self._step: list[list[float]] = np.column_stack([model.growth, model.early, model.late]).tolist()
-        self._row: list[float] = [*model.row.tolist(), model.through]
+        self._step = [_sparse(row) for row in np.column_stack([model.growth, model.early, model.late]).tolist()]
+        self._row = _sparse([*model.row.tolist(), model.through])
         self._states = [0.0] * n
         self._input = 0.0  # of d + 1 scans ago
 
@@ -111,10 +122,18 @@ class Plant:
         self._states = [0.0 if -TINY < x < TINY else x for x in moved]  # no denormal numbers (section 7)
 
 
-def _weighted(weights: Sequence[float], values: Sequence[float]) -> float:
+_Weights = list[tuple[int, float]]
+
+
+def _sparse(weights: Sequence[float]) -> _Weights:
+    """Return the places and sizes of weights that are not 0."""
+    return [(i, weight) for i, weight in enumerate(weights) if weight]
+
+
+def _weighted(weights: _Weights, values: Sequence[float]) -> float:
     total = 0.0
-    for weight, x in zip(weights, values, strict=True):  # in the order of the scan program; `sum` compensates in later Pythons
-        total += weight * x
+    for i, weight in weights:  # in the order of the scan program; `sum` compensates in later Pythons
+        total += weight * values[i]
     return total
 
 

@@ -25,9 +25,20 @@ _SMALL: Final = 1e-6
 """Size of the load step that is simulated [%]: far from whatever depends on size."""
 _SETTLED: Final = 1e-7
 """Two blocks with at most this share of the integral are the last."""
-_MOST_SCANS: Final = 1_000_000
+_MOST_SCANS: Final = 100_000
+"""Scans that are simulated, at most, for a process of one or two states; the more states, the fewer."""
+_FEW: Final = 20
+"""Where not even so many blocks can be simulated, longer scan intervals stand for the short one."""
+_FEWEST: Final = 4
+"""Blocks from which an integral is known."""
+_ROUGHLY: Final = 0.02
+"""Four quarters of a simulation that fall geometrically within this go on so."""
+_LEFT: Final = 0.01
+"""At most this share of an integral is estimated from how it fell before."""
 _FINE: Final = 100
 """Scans in the time in which the loop moves, to simulate a continuous controller."""
+_RESONANCE: Final = 0.1
+"""So much of a radian of the process's resonances lies between them at most."""
 
 
 def load_iae(settings: Settings, process: Process, scan: float | None = None, factor: float = 1.0) -> float:
@@ -51,7 +62,7 @@ def load_iae(settings: Settings, process: Process, scan: float | None = None, fa
     -------
     float
         The integral, by the trapezoidal rule between scans [% s]. Infinite where the loop is unstable, and where the error does not
-        go to zero because nothing integrates.
+        go to zero because nothing integrates; NaN where the error has not settled within the scans that are simulated.
 
     Raises
     ------
@@ -59,7 +70,11 @@ def load_iae(settings: Settings, process: Process, scan: float | None = None, fa
         A filter is unstable at the scan interval.
     """
     law = settings.law(scan_for(settings, process) if scan is None else scan)
-    return _iae(law, process, factor, loop_figures(law, process, factor).stable)
+    stable = loop_figures(law, process, factor).stable
+    short = law.scan is not None and law.scan < _short_interval(law, process, factor) / 2
+    if stable and short and law.algorithm.dahlin is None and _FEW * _scans_of_a_block(law, process, factor) > _most_scans(process):
+        return _extrapolated(law, process, factor)
+    return _iae(law, process, factor, stable, _most_scans(process))
 
 
 def continuous_load_iae(settings: Settings, process: Process, factor: float = 1.0) -> float:
@@ -72,47 +87,80 @@ def continuous_load_iae(settings: Settings, process: Process, factor: float = 1.
     law = settings.law()
     if not loop_figures(law, process, factor).stable:
         return math.inf
-    h = time_scale(law, process, factor) / _FINE
+    return _extrapolated(law, process, factor)
+
+
+def _extrapolated(law: Law, process: Process, factor: float) -> float:
+    """Return the integral of a stable loop without sampling, or sampled at a far shorter interval than two that are simulated."""
+    h = _short_interval(law, process, factor)
     fine = [Law(_as_continuous(law.algorithm), t) for t in (h, h / 2)]
     if not all(loop_figures(x, process, factor).stable for x in fine):
         return math.nan
-    long, short = (_iae(x, process, factor, True) for x in fine)
-    return 2 * short - long if math.isfinite(long) else math.inf
+    long, short = (_iae(x, process, factor, True, _most_scans(process) // 2) for x in fine)
+    share = (law.scan or 0.0) / (h / 2)
+    return long if math.isinf(long) else (2 - share) * short - (1 - share) * long
 
 
-def _iae(law: Law, process: Process, factor: float, stable: bool) -> float:
-    """Return the integral for a discrete law; the factor is put into the process, which then needs a smaller load."""
+def _short_interval(law: Law, process: Process, factor: float) -> float:
+    """Return a scan interval at which a loop is nearly as without sampling [s]."""
+    resonances = [_RESONANCE / abs(p) for p in process.poles if p.imag]
+    return min(time_scale(law, process, factor) / _FINE, *resonances, math.inf)
+
+
+def _most_scans(process: Process) -> int:
+    """Return how many scans may be simulated: bounded by work, which grows with the square of the process's states."""
+    states = len(process.poles)
+    return _MOST_SCANS // max(1, states * states // 20)
+
+
+def _scans_of_a_block(law: Law, process: Process, factor: float) -> int:
+    """Return how many scans are looked at together: some times the time in which the loop moves."""
+    assert law.scan is not None
+    moves = time_scale(law, process, factor)
+    block = process.delay + max(min(10 * moves, 20 * process.time), moves / 5)
+    return math.ceil(block / law.scan)
+
+
+def _iae(law: Law, process: Process, factor: float, stable: bool, most: int) -> float:
+    """Return the integral for a discrete law by so many scans; the factor is put into the process, which needs a smaller load."""
     a, h = law.algorithm, law.scan
     assert h is not None
     if not stable or not (a.ki or a.dahlin is not None or 0 in process.zeros):
         return math.inf
-    moves = time_scale(law, process, factor)
-    block = process.delay + max(min(10 * moves, 20 * process.time), moves / 5)
-    scans = math.ceil(block / h)
+    scans = _scans_of_a_block(law, process, factor)
+    if _FEWEST * scans > most:
+        return math.nan
     shares = _shares(a, h, replace(process, gain=process.gain * OpenLoop(law, process, factor).gain), scans)
-    return _summed(shares, _MOST_SCANS // scans + 4) / abs(factor)
+    return _summed(shares, most // scans) / abs(factor)
 
 
 def _summed(shares: Iterator[float], most: int) -> float:
-    """Return the sum of the integral's shares, block by block.
+    """Return the sum of the integral's shares, block by block; NaN where it is not known after so many.
 
     A slow mode that is left over decays geometrically from block to block; its sum is known long before it has gone.
     """
     found: list[float] = []
+    total = 0.0
     while len(found) < most:
         found.append(next(shares))
-        if len(found) > 2 and max(found[-2:]) <= _SETTLED * sum(found):
-            return sum(found)
+        total += found[-1]
+        if len(found) > 2 and max(found[-2:]) <= _SETTLED * total:
+            return total
         if len(found) > 3 and found[-1] < found[-2] and _is_geometric(found[-4:]):
-            return sum(found) + _tail(found[-2], found[-1])
-    half = len(found) // 2
-    before, after = sum(found[:half]), sum(found[half : 2 * half])
-    return sum(found) + _tail(before, after) if after < before else math.inf
+            return total + _tail(found[-2], found[-1])
+    quarter = len(found) // 4
+    parts = [sum(found[i * quarter : (i + 1) * quarter]) for i in range(4)]
+    if not parts[3] < parts[2]:
+        return math.nan
+    left = _tail(parts[2], parts[3])
+    return total + left if _is_geometric(parts, _ROUGHLY) or left < _LEFT * total else math.nan
 
 
-def _is_geometric(shares: list[float]) -> bool:
+def _is_geometric(shares: list[float], within: float = 1e-4) -> bool:
+    if not all(shares):
+        return False  # nothing had reached the measurement yet
     first, second, third = (y / x for x, y in itertools.pairwise(shares))
-    return max(abs(second - first), abs(third - second)) < 1e-4 * (1 - third)
+    return max(abs(second - first), abs(third - second)) < within * (1 - third)
 
 
 def _tail(before: float, after: float) -> float:

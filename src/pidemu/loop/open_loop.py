@@ -181,7 +181,8 @@ def picture_of(loop: OpenLoop) -> Picture:
     w = np.insert(w, 0, low * np.array([1e-4, 1e-2]))  # as good as zero frequency
     values = loop(w)
     for _ in range(24):
-        ratios = [x[1:] / x[:-1] for x in (values, 1 + values)]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a process that lets nothing through has no phase
+            ratios = [x[1:] / x[:-1] for x in (values, 1 + values)]
         rough = np.flatnonzero((np.abs(np.angle(ratios)) > 2 * _TURN).any(axis=0))
         if not rough.size or w.size > 200_000:
             break

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from pidemu.errors import ProcessError
 from pidemu.loop.hold import SampledProcess, sample
-from pidemu.loop.roots import count, factors, finite, in_pairs, joined, poles_of, polynomial_of, zeros_of
+from pidemu.loop.roots import count, factors, in_pairs, joined, poles_of, polynomial_of, zeros_of
 from pidemu.loop.text import read
+from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
 from pidemu.rational import Rational, Response
 
 Floats = npt.NDArray[np.float64]
@@ -44,8 +45,8 @@ class Process:
     Raises
     ------
     ProcessError
-        A number is not finite, a complex root stands alone, there are more zeros than poles, the gain is zero or the dead time
-        negative.
+        A number is not finite or not one that a process has (`pidemu.plausible`), a complex root stands alone, there are more zeros
+        than poles or more poles than 20, the gain is zero or the dead time negative.
 
     Examples
     --------
@@ -64,14 +65,16 @@ class Process:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("gain", "delay"):
-            object.__setattr__(self, name, finite(name, getattr(self, name)))
+        for name, quantity in (("gain", GAIN), ("delay", PROCESS_TIME)):
+            object.__setattr__(self, name, plausible(name, getattr(self, name), quantity, ProcessError))
         for name in ("poles", "zeros"):
             object.__setattr__(self, name, in_pairs(name.removesuffix("s"), getattr(self, name)))
         if self.gain == 0:
             raise ProcessError("the gain is 0: nothing would reach the measurement; give the process's gain in %/%")
         if self.delay < 0:
             raise ProcessError(f"the dead time {self.delay:g} s is negative; give the time that the process waits, or 0")
+        if len(self.poles) > POLES:
+            raise ProcessError(f"{len(self.poles)} poles; give {POLES} at most, and a chain of many short lags as a dead time")
         if len(self.zeros) > len(self.poles):
             raise ProcessError(
                 f"{len(self.zeros)} zeros and {len(self.poles)} poles: such a process would answer a step with an infinite value; "

@@ -7,38 +7,24 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from pidemu.errors import ProcessError
+from pidemu.plausible import INTEGRATORS, PROCESS_TIME, ROOT, plausible, shown
 from pidemu.rational import multiply
 
 _SAME: Final = 1e-9
 """Relative difference within which two roots are a conjugate pair."""
 
 
-def finite(name: str, value: Any) -> float:
-    """Return a number.
-
-    Raises
-    ------
-    ProcessError
-        It is none, or not finite.
-    """
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise ProcessError(f"{name} is {value!r}; give a number") from None
-    if not math.isfinite(number):
-        raise ProcessError(f"{name} is {number}; give a finite number")
-    return number
-
-
 def in_pairs(name: str, given: Any) -> tuple[complex, ...]:
     """Return roots: the real ones as they stand, then each complex one followed by its exact conjugate."""
     try:
         roots = [complex(r) for r in given]
-    except (TypeError, ValueError):
-        raise ProcessError(f"{name}s is {given!r}; give a list of numbers [rad/s] such as [-0.1, -0.5]") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ProcessError(f"{name}s is {shown(given)}; give a list of numbers [rad/s] such as [-0.1, -0.5]") from None
     for r in roots:
         if not (math.isfinite(r.real) and math.isfinite(r.imag)):
             raise ProcessError(f"the {name} {r} is not finite; give its place in the s plane [rad/s]")
+        if not ROOT.has(abs(r)):
+            raise ProcessError(f"the {name} {r:g}: {ROOT.refusal(f'{abs(r):g} rad/s')}")
     real = [r for r in roots if not r.imag]
     upper, lower = ([r for r in roots if sign * r.imag > 0] for sign in (1, -1))
     for r in upper:
@@ -57,11 +43,12 @@ def _alone(name: str, r: complex) -> ProcessError:
     )
 
 
-def poles_of(lags: Iterable[float], integrators: int) -> list[complex]:
+def poles_of(lags: Iterable[Any], integrators: int) -> list[complex]:
     """Return the poles of time constants [s] and of integrators."""
     poles: list[complex] = [0.0] * integrators
-    for lag in lags:
-        if not finite("lag", lag) > 0:
+    for given in lags:
+        lag = plausible("lag", given, PROCESS_TIME, ProcessError)
+        if not lag > 0:
             raise ProcessError(
                 f"lag {lag:g} s is not positive; leave out a lag of zero, and give an unstable process its pole [rad/s] instead"
             )
@@ -69,11 +56,12 @@ def poles_of(lags: Iterable[float], integrators: int) -> list[complex]:
     return poles
 
 
-def zeros_of(leads: Iterable[float]) -> list[complex]:
+def zeros_of(leads: Iterable[Any]) -> list[complex]:
     """Return the zeros of time constants [s]."""
     zeros: list[complex] = []
-    for lead in leads:
-        if finite("lead", lead) == 0:
+    for given in leads:
+        lead = plausible("lead", given, PROCESS_TIME, ProcessError)
+        if lead == 0:
             raise ProcessError("a lead of 0 s does nothing; leave it out")
         zeros.append(-1 / lead)
     return zeros
@@ -82,11 +70,11 @@ def zeros_of(leads: Iterable[float]) -> list[complex]:
 def count(given: Any) -> int:
     """Return a number of integrators."""
     try:
-        if float(given) == int(given) >= 0:
+        if float(given) == int(given) and 0 <= int(given) <= INTEGRATORS:
             return int(given)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ProcessError(f"integrators is {given}; give how many there are: 0, 1 or 2")
+    raise ProcessError(f"integrators is {shown(given)}; give how many there are: 0 to {INTEGRATORS}, and usually 0 or 1")
 
 
 def polynomial_of(roots: Sequence[complex]) -> tuple[float, ...]:

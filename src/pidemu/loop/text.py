@@ -60,6 +60,8 @@ def _with_conjugates(name: str, values: Sequence[str]) -> list[complex]:
     roots: list[complex] = []
     for value in values:
         try:
+            if not value.isascii() or "_" in value:
+                raise ValueError
             roots.append(complex(value.replace(" ", "")))
         except ValueError:
             raise ProcessError(f"{name}={value} is not a number [rad/s] such as -0.1 or -0.1+0.2j") from None

@@ -16,6 +16,7 @@ from pidemu.loop.closed import closed_loop
 from pidemu.loop.figures import scan_for, settling_time
 from pidemu.loop.open_loop import low_frequency_sign
 from pidemu.loop.process import Process
+from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible, shown
 from pidemu.record.playback import Timing
 from pidemu.record.sampling import Scale, controller_for, limits_for
 from pidemu.scan.build import Action
@@ -146,17 +147,20 @@ def trial(
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
 ) -> Trial:
     """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
-    h = float(scan) if scan is not None else scan_for(settings, process)
-    if not 0 < h < math.inf:
+    h = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
+    if not h > 0:
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
-    length = _duration(settings, process, h) if time is None else float(time)
-    if not 0 < length < math.inf or not length < _MOST_SCANS * h:
-        raise ProcessError(f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses")
+    length = _duration(settings, process, h) if time is None else plausible("time", time, TIME, ProcessError)
+    if not h <= length < _MOST_SCANS * h:
+        raise ProcessError(
+            f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses, "
+            f"{h:g} s to {_MOST_SCANS * h:g} s"
+        )
     sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
     chosen = action or _negative_feedback(settings, process)
     limits = limits_for(settings, output_limits, _FULL)
-    if not limits[0] < limits[1]:
-        raise ProcessError(f"output limits {limits[0]:g} to {limits[1]:g} are not a range; give low, then high")
+    if not limits[0] < limits[1]:  # not a number compares false as well
+        raise ProcessError(f"output limits {limits[0]:g} to {limits[1]:g} % are not a range; give low, then high, such as (0, 100)")
     if not limits[0] <= initial[2] <= limits[1]:
         raise ProcessError(
             f"the initial output {initial[2]:g} % is outside the output limits {limits[0]:g} to {limits[1]:g} %; give another, or "
@@ -183,10 +187,11 @@ def _negative_feedback(settings: Settings, process: Process) -> Action:
 
 def _step(name: str, given: float | Step, at: float, end: float) -> Step | None:
     """Return when and how far a signal steps, or ``None`` where it does not."""
-    try:
-        when, size = (float(x) for x in given) if isinstance(given, Sequence) else (at, float(given))
-    except (TypeError, ValueError):
-        raise ProcessError(f"{name} is {given!r}; give the size of the step in %, or (time, size)") from None
-    if not (math.isfinite(size) and 0 <= when < end):
+    if isinstance(given, str) or (isinstance(given, Sequence) and len(given) != 2):
+        raise ProcessError(f"{name} is {shown(given)}; give the size of the step in %, or (time, size)")
+    moment, step = given if isinstance(given, Sequence) else (at, given)
+    size = plausible(f"the size of the {name} step", step, LEVEL, ProcessError)
+    when = plausible(f"the time of the {name} step", moment, TIME, ProcessError)
+    if not 0 <= when < end:
         raise ProcessError(f"a {name} step of {size:g} % at {when:g} s is not within the {end:g} s simulated; start it earlier")
     return (when, size) if size else None

@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, ScanError
+from pidemu.plausible import SIGNAL
 from pidemu.record.files import Floats, Record
 from pidemu.settings import Settings
-from pidemu.signals import Event
+from pidemu.signals import SIGNALS, Event
 
 _UNEVEN: Final = 0.01
 """Relative jitter of a time column that counts as none."""
@@ -210,6 +211,20 @@ def play(controller: Controller, record: Record, path: str | Path, interval: Flo
         tuple(controller.events),
         tuple(sorted(found, key=lambda s: s.first)),
     )
+
+
+def far_out(record: Record) -> Iterator[str]:
+    """Yield, for every signal of a record, how often and where first it is larger than any signal."""
+    for name in ("sp", "pv", "manual", "output", *SIGNALS):
+        values = getattr(record, name)
+        places = np.flatnonzero(np.abs(values) > SIGNAL) if values is not None else np.array([], dtype=int)
+        places = places[np.isfinite(values[places])] if places.size else places
+        if places.size:
+            more = f", and {places.size - 1} more" if places.size > 1 else ""
+            yield (
+                f"column {record.names.get(name, name)}: {values[places[0]]:g} in sample {places[0]} (counted from 0){more}: "
+                f"larger than any signal, {SIGNAL:g}"
+            )
 
 
 def limits_of(controller: Controller) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from pidemu.errors import ScanError
+from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible
 from pidemu.record.files import Floats, Record
 from pidemu.settings import Settings
 
@@ -137,8 +138,8 @@ def standard_record(scan: float, seed: int = 1, time: float = _DEFAULT_TIME, siz
     >>> record.sp[[59, 60, 120, 180]].tolist()
     [50.0, 54.0, 46.0, 50.0]
     """
-    for name, value in (("scan interval", scan), ("time", time), ("size", size)):
-        if not (math.isfinite(value) and value > 0):
+    for name, value, quantity in (("scan interval", scan, INTERVAL), ("time", time, TIME), ("size", size, LEVEL)):
+        if not plausible(name, value, quantity, ScanError) > 0:
             raise ScanError(f"{name} {value:g} of the standard record is not a positive number")
     if time / scan > 10 * MOST_SCANS:
         raise ScanError(f"a standard record with time {time:g} s, scanned every {scan:g} s, is too long; use a longer interval")

@@ -65,7 +65,7 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
 
 def _ticks(seconds: float, what: str) -> int:
     ticks = Fraction(seconds).limit_denominator(10**7) * _TICKS
-    if abs(ticks - round(ticks)) > Fraction(1, 1000):
+    if abs(ticks - round(ticks)) > Fraction(1, 1000) or (seconds and not round(ticks)):
         raise ScanError(f"the {what} of {seconds:g} s is not a whole number of {1 / _TICKS:g} s, the step of integer arithmetic")
     return round(ticks)
 

@@ -1,0 +1,147 @@
+"""Numbers as they enter: read once, and held against what a control loop can have.
+
+A gain of 1e-308, a time of 1e300 s or a whole number of 5,000 digits is a slip, and what is computed from it leaves the range of
+floating point. The ranges leave several powers of ten beyond what is known of any plant; within them everything can be computed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from numbers import Real
+from typing import Any, Final
+
+from pidemu.errors import PidemuError
+
+_NUMBER: Final = re.compile(r"\s*[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf(?:inity)?|nan)\s*", re.I | re.A)
+_LONGEST: Final = 40
+"""Characters of what was given that a message repeats."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """How large the values of a quantity can be, apart from 0.
+
+    Attributes
+    ----------
+    what : str
+        The quantity, as a message names it.
+    unit : str
+        Its unit; empty for a ratio.
+    smallest, largest : float
+        Smallest and largest size [`unit`].
+    """
+
+    what: str
+    unit: str
+    smallest: float
+    largest: float
+
+    def has(self, x: float) -> bool:
+        """Tell whether a number is 0 or of a size that the quantity can have."""
+        return x == 0 or self.smallest <= abs(x) <= self.largest
+
+    def refusal(self, words: str) -> str:
+        """Return what is wrong with a number, which is given in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{words} is not {self.what}, {self.smallest:g} to {self.largest:g}{unit} in size; check the number and its unit"
+
+
+GAIN: Final = Quantity("a gain that a loop has", "%/%", 1e-12, 1e12)
+TIME: Final = Quantity("a time that a loop has", "s", 1e-15, 1e15)
+RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-20, 1e20)
+LEVEL: Final = Quantity("a signal or a rate that a loop has", "%", 0.0, 1e40)
+RATIO: Final = Quantity("a ratio that a controller has", "", 1e-15, 1e15)
+ENDS: Final = Quantity("the end of a signal's range", "", 0.0, 1e15)
+SPAN: Final = Quantity("the width of a signal's range", "", 1e-12, 1e15)
+INTERVAL: Final = Quantity("an interval at which a controller is executed", "s", 1e-9, 1e9)
+PROCESS_TIME: Final = Quantity("a time that a process has", "s", 1e-9, 1e9)
+ROOT: Final = Quantity("a pole or zero of a process", "rad/s", 1e-9, 1e9)
+POLES: Final = 20
+"""Poles that a process can have; a chain of more is a dead time."""
+INTEGRATORS: Final = 4
+"""Integrators that a process can have."""
+SIGNAL: Final = 1e30
+"""No signal is larger, whatever its unit: beyond this it counts as a bad one."""
+
+
+def number(given: object) -> float:
+    """Return a number that was given from Python: int, float, fraction, decimal or NumPy scalar; NaN and infinity, too.
+
+    Raises
+    ------
+    ValueError
+        It is none, or too large or too small to compute with; the message says so.
+    """
+    if isinstance(given, bool) or not isinstance(given, Real | Decimal):
+        raise ValueError(f"{shown(given)} is not a number")
+    try:
+        found = float(given)
+    except OverflowError:
+        raise ValueError(f"{shown(given)} is too large a number") from None
+    except ValueError:  # a decimal that signals
+        raise ValueError(f"{shown(given)} is not a number") from None
+    if not found and given != 0:
+        raise ValueError(f"{shown(given)} is too small a number")
+    return found
+
+
+def number_in(text: str) -> float:
+    """Return a number that was written: digits with a decimal point, ``inf`` or ``nan``.
+
+    Raises
+    ------
+    ValueError
+        It is none, or too large or too small to compute with; the message says so.
+    """
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(f"'{cut(text)}' is not a number")
+    found = float(text)
+    if math.isinf(found) and "inf" not in text.casefold():
+        raise ValueError(f"'{cut(text)}' is too large a number")
+    if not found and any(digit in "123456789" for digit in text.casefold().partition("e")[0]):
+        raise ValueError(f"'{cut(text)}' is too small a number")
+    return found
+
+
+def plausible(name: str, given: Any, quantity: Quantity, error: type[PidemuError]) -> float:
+    """Return a number that a quantity can have.
+
+    Parameters
+    ----------
+    name : str
+        What it is called where it was given.
+    given : object
+        What was given.
+    quantity : Quantity
+        What it must be.
+    error : type
+        What is raised where it is not.
+    """
+    try:
+        found = number(given)
+    except ValueError as reason:
+        remedy = f"{name} is {shown(given)}; give a number" if "is not" in str(reason) else f"{name}: {reason}"
+        raise error(remedy) from None
+    if not math.isfinite(found):
+        raise error(f"{name} is {found:g}; give a finite number")
+    if not quantity.has(found):
+        raise error(f"{name}: {quantity.refusal(f'{found:g} {quantity.unit}'.rstrip())}")
+    return found
+
+
+def shown(given: object) -> str:
+    """Return what was given in a few characters, whatever it is."""
+    if isinstance(given, int) and given.bit_length() > 4 * _LONGEST:
+        return f"a whole number of {int(given.bit_length() * math.log10(2)) + 1:,} digits"
+    try:
+        return cut(repr(given))
+    except Exception:  # a stranger's class, or a fraction of numbers too long to print
+        return f"a {type(given).__name__}"
+
+
+def cut(text: str) -> str:
+    """Return a text, or its beginning where it is long."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
