@@ -14,10 +14,12 @@ _FLOOD: Final = 100_000
 """Characters on stderr that are too many, whatever was wrong."""
 _STYLE: Final = re.compile(r"\x1b\[[01]m")
 """What a terminal is told by ourselves: bold, and the end of it."""
-_UNWANTED: Final = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]"  # also in what a terminal reorders
-)
+_UNWANTED: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What a terminal obeys, and what turns the order of its letters."""
+_LINES: Final = re.compile("[\u2028\u2029]")
+"""Ends of lines to some programs; within JSON they are letters."""
 _NAN: Final = re.compile(r"\bnan\b")
+"""As a number is printed; in sentences it is NaN."""
 _NOT_FINITE: Final = re.compile(r"nan|inf|\d[eE][+-]?\d\d|\d{20}|\d_\d")
 """Marks of an input that may have an answer with NaN."""
 
@@ -39,20 +41,20 @@ def prints_no_traceback(case: Case, said: Said) -> None:
 def prints_no_control_characters(case: Case, said: Said) -> None:
     """A terminal obeys pidemu, and no card, tag or file."""
     for stream, text in (("stdout", said.out), ("stderr", said.err)):
-        found = _UNWANTED.search(_STYLE.sub("", text) if case.terminal else text)
+        plain = _STYLE.sub("", text) if case.terminal else text
+        found = _UNWANTED.search(plain) or (None if "--json" in case.words else _LINES.search(plain))
         if found:
-            line = text[: found.start()].count("\n")
-            excerpt = printable(text.split("\n")[line])[:300]
+            line = plain[: found.start()].count("\n")
+            excerpt = printable(plain.split("\n")[line])[:300]
             raise Breach("control character", f"{_where(case)}: {stream}", f"U+{ord(found[0]):04X} in: {excerpt}")
 
 
 def prints_no_nan(case: Case, said: Said) -> None:
-    """Finite numbers of a plausible size have finite answers."""
-    found = _NAN.search(said.out.casefold()) or _NAN.search(said.err.casefold())
-    if found and not _NOT_FINITE.search(case.text):
-        text = said.out + said.err
-        at = _NAN.search(text.casefold())
-        excerpt = text[max(0, at.start() - 100) : at.end() + 20] if at else ""
+    """Finite numbers of a plausible size have finite answers; JSON says "nan" where there is none, and code may read it."""
+    text = said.out + said.err
+    found = _NAN.search(text)
+    if found and "--json" not in case.words and "code" not in case.words and not _NOT_FINITE.search(case.text):
+        excerpt = text[max(0, found.start() - 100) : found.end() + 20]
         raise Breach("NaN", _where(case), printable(excerpt).replace("\n", " | "))
 
 

@@ -22,7 +22,9 @@ from tools.fuzz.workers import run_one
 @click.option("--kinds", "names", metavar="KIND,...", help=f"Only these kinds; by default all: {', '.join(KINDS)}.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--again", metavar="KIND:SEED:NUMBER", help="Run one input again, and show what happens.")
-@click.option("--keep", metavar="FOLDER", help="Where the files of failures are written; by default a folder among the temporary ones.")
+@click.option(
+    "--keep", metavar="FOLDER", help="Where the files of failures are written; by default a folder among the temporary ones."
+)
 def command(
     minutes: float | None, count: int | None, seed: int, names: str | None, jobs: int, again: str | None, keep: str | None
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +25,7 @@ class Breach(Exception):  # noqa: N818  # what it is called is printed
         self.what, self.place = what, place
 
 
-class TooLong(BaseException):  # noqa: N818  # not an Exception: nobody may catch it
+class TooLong(BaseException):  # not an Exception: nobody may catch it
     """The time is up."""
 
 
@@ -66,10 +67,12 @@ def failure_of(error: BaseException) -> Failure:
 def place_of(error: BaseException) -> str:
     """Return the innermost place in pidemu that an exception went through, else the innermost at all."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [f for f in frames if f.filename.startswith(_OURS)]
     if not frames:
         return "?"
-    frame = (ours or frames)[-1]
-    file = Path(frame.filename)
-    shown = file.relative_to(ROOT).as_posix() if file.is_relative_to(ROOT) else file.name
-    return f"{shown}:{frame.lineno}"
+    ours = [f for f in frames if f.filename.startswith(_OURS)] or frames
+    if isinstance(error, RecursionError):  # where it ends is chance; the place comes most often
+        file, line = Counter((f.filename, f.lineno) for f in ours).most_common(1)[0][0]
+    else:
+        file, line = ours[-1].filename, ours[-1].lineno
+    path = Path(file)
+    return f"{path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name}:{line}"

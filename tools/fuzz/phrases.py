@@ -40,7 +40,9 @@ def limits(rng: Random, hostile: float) -> str:
 def span(rng: Random, hostile: float) -> str:
     """Return a signal range with its unit."""
     if rng.random() > hostile:
-        return rng.choice(("0,100 %", "0,400 degC", "0,16383 counts", "-50,150 degF", "0,100", "32,212 degF", "0,255 pwm", "4,20 mA"))
+        return rng.choice(
+            ("0,100 %", "0,400 degC", "0,16383 counts", "-50,150 degF", "0,100", "32,212 degF", "0,255 pwm", "4,20 mA")
+        )
     return rng.choice((limits(rng, 1), f"{limits(rng, 1)} {rng.choice(UNITS)}", f"0,{number(rng, 1)} %", text(rng)))
 
 

@@ -192,7 +192,9 @@ def _grouped(kinds: Sequence[Kind], result: Result) -> list[Group]:
         key = (ticket.kind, *failure.group)
         if key not in found:
             kind = by_name[ticket.kind]
-            found[key] = Group(kind, ticket, failure, 0, case_of(kind, ticket) if not failure.what.startswith("harness") else Case(()))
+            found[key] = Group(
+                kind, ticket, failure, 0, case_of(kind, ticket) if not failure.what.startswith("harness") else Case(())
+            )
         found[key].count += 1
     return sorted(found.values(), key=lambda g: -g.count)
 

@@ -14,16 +14,17 @@ HOSTILE_NUMBERS: Final = (
 )  # fmt: skip
 HOSTILE_TEXTS: Final = (
     "\x1b[31mred\x1b[0m", "\x1b]0;title\x07", "\x00", "\r", "\x0b", "\x0c", "\x1c", "\x7f", "\x85", "\x9b31m", "\u2028", "\u2029",
-    "\u202eevil", "\u2066x", "\ufeff", "\u200b", "💥", "Ünïcödé", "日本語", "a" * 300, "=1+1", "@SUM(1)", "+1", "-1", "'", '"', '""',
+    "\u202eevil", "\u2066x", "\ufeff", "\u200b", "💥", "Ünïcödé", "日本語", "a" * 300, "=1+1", "@SUM(1)", "+1", "-1", "'", '"',
     "`id`", "$(id)", "$x^2$", r"$\frac{1}$", "$", "%s", "%", "{0}", "{", "}", "\\", "\\n", "/", "..", ".", "coding: unicode_escape",
     r"\nfuzz_escape()\n#", '"""\nfuzz_escape()\n"""', "'''", "*/ fuzz_escape(); /*", "//", "/*", "# -*- coding: utf-7 -*-",
-    "<script>alert(1)</script>", "&amp;", "#1 boiler", "#REF!", "# comment", "#", "null", "~", "yes", "on", "-", "--", "--help", "=",
-    "a=b", "!!python/object/apply:os.system", "!x", "&a", "*a", "|", ">", "%TAG", "---", "...", "\t", " ", "", "con", "nul", "a\nb",
+    "<script>alert(1)</script>", "&amp;", "#1 boiler", "#REF!", "# comment", "#", "null", "~", "yes", "on", "-", "--", "--help",
+    "=", "a=b", "!!python/object/apply:os.system", "!x", "&a", "*a", "|", ">", "%TAG", "---", "...",
+    "\t", " ", "", "con", "nul", "a\nb",
     "a,b", "a;b", "a:b", ": ", "[", "]", "[]", "{}", "import os", "lambda", "None", "x" * 20 + "-" + "y" * 20, "?", "__class__",
 )  # fmt: skip
 UNITS: Final = (
-    "s", "min", "h", "ms", "us", "s/repeat", "min/repeat", "repeat/min", "repeat/s", "%", "%/%", "1", "1/s", "1/min", "1/scan", "scan",
-    "%/s", "%/min", "%/scan", "eu", "eu/s", "degC", "degF", "K", "counts", "rad/s", "Hz", "furlong", "S", "MIN", "µs", "repeats/min", "",
+    "s", "min", "h", "ms", "us", "s/repeat", "min/repeat", "repeat/min", "repeat/s", "%", "%/%", "1", "1/s", "1/min", "1/scan",
+    "scan", "%/s", "%/min", "%/scan", "eu", "eu/s", "degC", "degF", "K", "counts", "rad/s", "Hz", "furlong", "S", "MIN", "µs", "",
 )  # fmt: skip
 
 

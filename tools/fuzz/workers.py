@@ -167,7 +167,7 @@ class Worker:
         self.connection.send(asked)
 
     def answer(self) -> Any:
-        """Return what it has found; ``None`` where it is still at it; a pair of the input and a `Failure` where it died or hangs."""
+        """Return what it found, ``None`` while it is at it; where it died or hangs, the inputs it had begun and a `Failure`."""
         try:
             while self.connection.poll():
                 found = self.connection.recv()
@@ -223,5 +223,3 @@ def corpus_chunks(kind: Kind, size: int) -> list[Chunk]:
     """Return the corpus of a kind, in chunks."""
     names = tuple(corpus_of(kind))
     return [Chunk(kind, CORPUS, names[i : i + size]) for i in range(0, len(names), size)]
-
-

@@ -45,6 +45,7 @@ def corpus() -> dict[str, Case]:
     text = _text("generic/standard")
     texts = {
         "option-that-declares-an-encoding": _with_option("coding: unicode_escape", r"\\nfuzz_escape()\\n#"),
+        "option-and-choice-that-declare-one": _with_option("coding", "unicode_escape"),
         "choice-of-two-lines": _with_option("a", r"x\nfuzz_escape()\n"),
         "choice-with-null": _with_option("a", r"x\0y"),
         "choice-that-writes-to-the-terminal": _with_option("a", r"\e[31mred\e[0m"),
@@ -54,15 +55,18 @@ def corpus() -> dict[str, Case]:
         "choice-that-is-mathematics": _with_option("$x", r"$\\frac{1}$"),
         "title-that-writes-to-the-terminal": text.replace("vendor: ", 'vendor: "\\e]0;title\\a" #', 1),
         "number-of-5000-digits": text.replace("default: ", "default: " + "9" * 5000 + " #", 1),
-        "key-of-a-megabyte": text + "x" * 1_000_000 + ": 1\n",
-        "line-of-five-megabytes": text + "unknown: [" + "1, " * 1_700_000 + "1]\n",
-        "unknown-keys-20000": text + "".join(f"unknown{i}: 1\n" for i in range(20_000)),
         "deep": "a: " + "[" * 5000,
         "laughs": "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n",
         "no-card-at-all": "root:x:0:0:root:/root:/bin/bash\nsecret: [\n",
     }
     found = {f"{name}-{command}": case for name, content in texts.items() for command, case in _each(content).items()}
-    for setting in ("K", "Ti", "Td"):
+    large = {
+        "key-of-a-megabyte": text + "x" * 1_000_000 + ": 1\n",
+        "line-of-five-megabytes": text + "unknown: [" + "1, " * 1_700_000 + "1]\n",
+        "unknown-keys-20000": text + "".join(f"unknown{i}: 1\n" for i in range(20_000)),
+    }
+    found |= {name: _each(content)["check"] for name, content in large.items()}
+    for setting in ("K", "Ti", "Td", "Tf", "b", "c"):
         for command, case in _each(_without_setting(text, setting)).items():
             found[f"without-{setting}-{command}"] = case
     for name in ("generic/encoding.yaml", "generic/coding=utf-7.yaml"):
@@ -70,7 +74,9 @@ def corpus() -> dict[str, Case]:
             found[f"called-{name.removeprefix('generic/')}-{command}"] = case
     found["link-to-itself"] = Case(("check", "card.yaml"), links={"card.yaml": "card.yaml"})
     found["folder-that-leads-to-itself"] = Case(("check", "."), links={"loop": "."})
-    found["link-to-another-file"] = Case(("check", "card.yaml"), {"secret.txt": b"root:x:0:0\nsecret\n"}, {"card.yaml": "secret.txt"})
+    found["link-to-another-file"] = Case(
+        ("check", "card.yaml"), {"secret.txt": b"root:x:0:0\nsecret\n"}, {"card.yaml": "secret.txt"}
+    )
     return found
 
 

@@ -6,6 +6,7 @@ from tools.fuzz.case import Case
 
 _STANDARD = ("generic/standard", "K=1", "Ti=10", "Td=0")
 _PROVOX = ("fisher/provox", "GAIN=2", "RESET=4")
+_TO = ("--to", "generic/parallel")
 _LAG = ("--process", "gain=1,lag=10,delay=1")
 
 
@@ -13,20 +14,20 @@ def corpus() -> dict[str, Case]:
     """Return the command lines by name."""
     lines: dict[str, tuple[str, ...]] = {
         "loop-gain-of-one-per-scan": (
-            "convert", "generic/standard", "K=1", "Ti=10", "--to", "generic/parallel", "--process", "gain=1,integrators=1", "--scan", "1",
+            "convert", *_STANDARD, *_TO, "--process", "gain=1,integrators=1", "--scan", "1",
         ),
-        "pole-at-zero": ("convert", "generic/standard", "K=1", "Ti=10", "--to", "generic/parallel", "--process", "gain=1,pole=0", "--scan", "1"),
+        "pole-at-zero": ("convert", *_STANDARD, *_TO, "--process", "gain=1,pole=0", "--scan", "1"),
         "unstable-process": (
-            "convert", "generic/standard", "K=1", "Ti=10", "--to", "emerson/deltav", "--process", "gain=1,pole=1", "--scan", "1,2",
+            "convert", *_STANDARD, "--to", "emerson/deltav", "--process", "gain=1,pole=1", "--scan", "1,2",
         ),
         "epid-to-cpid": ("convert", "epics/epid", "KP=1", "KI=6", "--to", "gnc-tools/cpid", "--process", "gain=1,lag=10"),
-        "huge-lag": ("convert", *_STANDARD, "--to", "generic/parallel", "--process", "gain=1,lag=1e300"),
-        "fifty-integrators": ("convert", *_STANDARD, "--to", "generic/parallel", "--process", "gain=1,integrators=50"),
-        "small-gain": ("convert", *_STANDARD, "--to", "generic/parallel", "--process", "gain=1e-308,lag=1"),
-        "smallest-gain": ("convert", *_STANDARD, "--to", "generic/parallel", "--process", "gain=5e-324,lag=1"),
-        "huge-scan": ("convert", *_STANDARD, "--to", "generic/parallel", "--scan", "1e300"),
-        "smallest-scan": ("convert", *_STANDARD, "--to", "generic/parallel", "--scan", "5e-324"),
-        "small-derivative-gain": ("convert", "bailey/fc19", "K=1", "KP=1", "KI=1", "KD=1", "MAXDGAIN=1e-300", "--to", "generic/standard"),
+        "huge-lag": ("convert", *_STANDARD, *_TO, "--process", "gain=1,lag=1e300"),
+        "fifty-integrators": ("convert", *_STANDARD, *_TO, "--process", "gain=1,integrators=50"),
+        "small-gain": ("convert", *_STANDARD, *_TO, "--process", "gain=1e-308,lag=1"),
+        "smallest-gain": ("convert", *_STANDARD, *_TO, "--process", "gain=5e-324,lag=1"),
+        "huge-scan": ("convert", *_STANDARD, *_TO, "--scan", "1e300"),
+        "smallest-scan": ("convert", *_STANDARD, *_TO, "--scan", "5e-324"),
+        "small-derivative-gain": ("convert", "bailey/fc19", "K=1", "KP=1", "KI=1", "KD=1", "MAXDGAIN=1e-300", *_TO),
         "short-run": ("simulate", *_STANDARD, *_LAG, "--time", "1e-9"),
         "simulated-fifty-integrators": ("simulate", *_STANDARD, "--process", "gain=1,integrators=50", "--time", "10"),
         "simulated-small-gain": ("simulate", *_STANDARD, "--process", "gain=1e-308,lag=1", "--time", "10"),

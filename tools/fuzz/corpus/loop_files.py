@@ -10,7 +10,7 @@ _BODY = "card: fisher/provox\nsettings: {GAIN: 2, RESET: 4}\nto: emerson/deltav\
 def corpus() -> dict[str, Case]:
     """Return the files by name."""
     texts = {
-        "l5x": '<?xml version="1.0" encoding="UTF-8"?>\n<RSLogix5000Content SchemaRevision="1.0">\n<Controller/>\n</RSLogix5000Content>\n',
+        "l5x": '<?xml version="1.0" encoding="UTF-8"?>\n<RSLogix5000Content>\n<Controller/>\n</RSLogix5000Content>\n',
         "deep": "card: " + "[" * 5000,
         "laughs": "a: &a [x, x]\nb: &b [*a, *a]\ncard: *b\n",
         "tag-of-python": "card: !!python/object/apply:os.system [true]\n",

@@ -17,7 +17,7 @@ def _case(content: str | bytes, *more: str, direct: bool = False) -> Case:
 def corpus() -> dict[str, Case]:
     """Return the records by name."""
     usual = f"sp,pv,auto\n{_ROWS}"
-    damaged = {
+    damaged: dict[str, str | bytes] = {
         "excel-error-in-first-cell": f"sp,pv,auto\n#REF!,50,1\n{_ROWS}",
         "comment-among-the-rows": f"sp,pv,auto\n{_ROWS}# 1,2,3\n{_ROWS}",
         "underscore-in-number": f"sp,pv,auto\n1_0,50,1\n{_ROWS}",

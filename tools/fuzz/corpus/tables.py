@@ -46,7 +46,7 @@ def corpus() -> dict[str, Case]:
         found[f"{name}-shown"] = _case(text, "--no-margins")
         found[f"{name}-read"] = _case(text, direct=True)
     good = _HEAD + _GOOD + _LAST
-    dahlin = "".join(_row(f"D{i}", "generic/dahlin", "gain=1;time=10;delay=500;lambda=10") for i in range(2))
+    dahlin = "".join(_row(f"D{i}", "generic/dahlin", "Kp=1;tau=10;theta=500;lambda=10") for i in range(2))
     found["dahlin-with-500-scans-of-delay"] = _case(_HEAD + _GOOD + dahlin + _LAST, "--engine", "numpy", "--table", "old.csv")
     found["table-is-the-file"] = _case(good, "--table", "loops.csv")
     found["refused-with-an-old-result"] = _case(good, "--table", "old.csv", "--load", "1e999")

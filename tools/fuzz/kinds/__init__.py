@@ -8,6 +8,5 @@ from tools.fuzz.case import Kind
 from tools.fuzz.kinds import cards, certificates, commands, conversions, loop_files, records, signals, tables
 
 KINDS: Final[dict[str, Kind]] = {
-    module.KIND.name: module.KIND
-    for module in (records, tables, commands, cards, loop_files, conversions, signals, certificates)
+    module.KIND.name: module.KIND for module in (records, tables, commands, cards, loop_files, conversions, signals, certificates)
 }

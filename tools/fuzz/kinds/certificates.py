@@ -13,8 +13,9 @@ from tools.fuzz.corpus.certificates import corpus
 from tools.fuzz.mutate import mutated_bytes, mutated_yaml
 from tools.fuzz.vocabulary import HOSTILE_TEXTS, text
 
-_VALUES: Final = (
-    None, True, False, 0, -1, 1e308, -1e308, 5e-324, 10**400, 2**63, [], {}, "", "nan", "inf", [[]], {"": None}, "1", 1.5, *HOSTILE_TEXTS,
+_VALUES: Final[tuple[Any, ...]] = (
+    None, True, False,
+    0, -1, 1e308, -1e308, 5e-324, 10**400, 2**63, [], {}, "", "nan", "inf", [[]], {"": None}, "1", 1.5, *HOSTILE_TEXTS,
 )  # fmt: skip
 _NESTING: Final = 3000
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from random import Random
 from typing import Final
 
+from tools.fuzz import phrases
 from tools.fuzz.case import OLD, Case, Kind
 from tools.fuzz.corpus.commands import corpus
-from tools.fuzz import phrases
 from tools.fuzz.library import a_card, changed_settings
 from tools.fuzz.vocabulary import anything, misspelt, number, text
 
@@ -56,7 +56,8 @@ _OPTIONS: Final[Mapping[str, Mapping[str, Value]]] = {
         "--limits": phrases.limits,
     },
     "run": {
-        **_RUN, "--record": _file, "--scan": phrases.time, "--bias": _number, "--initial": _assignment, "-o": _output, "--engine": _ENGINE,
+        **_RUN, "--record": _file, "--scan": phrases.time, "--bias": _number, "--initial": _assignment, "-o": _output,
+        "--engine": _ENGINE,
     },
     "compare": {**_RUN, "--record": _file, "--scan": phrases.scan, "-o": _output},
     "simulate": {
@@ -74,7 +75,17 @@ _OPTIONS: Final[Mapping[str, Mapping[str, Value]]] = {
         "--date": _choice("2026-11-22", "yesterday"), "--set": _assignment,
     },
 }  # fmt: skip
-_SHARES: Final = {"show": 24, "code": 16, "run": 28, "compare": 10, "simulate": 12, "fleet": 5, "check": 1, "verify": 1, "convert": 2}
+_SHARES: Final = {
+    "show": 24,
+    "code": 16,
+    "run": 28,
+    "compare": 10,
+    "simulate": 12,
+    "fleet": 5,
+    "check": 1,
+    "verify": 1,
+    "convert": 2,
+}
 _MUST: Final = {"run": ("--record", "--scan"), "simulate": ("--process", "--time"), "compare": ("--record",), "fleet": ("--time",)}
 """Options without which a command asks for them, or takes long."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from random import Random
 from typing import Any, Final
 
@@ -20,7 +21,7 @@ def make(rng: Random) -> Case:
     card, settings = a_card(rng)
     target, others = a_card(rng)
     words = ["convert", card, *changed_settings(rng, settings, hostile), "--to", target]
-    choices = {
+    choices: dict[str, tuple[float, Callable[[], str]]] = {
         "--scan": (0.35, lambda: scan(rng, hostile)),
         "--process": (0.35, lambda: process(rng, hostile)),
         "--match": (0.2, lambda: rng.choice(_MATCHES)),
@@ -38,7 +39,9 @@ def make(rng: Random) -> Case:
     for name, (share, value) in choices.items():
         if rng.random() < share:
             words += [name, value()]
-    words += [flag for flag, share in (("--assume", 0.4), ("--allow-approximate", 0.4), ("--compensate", 0.1)) if rng.random() < share]
+    words += [
+        flag for flag, share in (("--assume", 0.4), ("--allow-approximate", 0.4), ("--compensate", 0.1)) if rng.random() < share
+    ]
     direct = rng.random() < 0.5
     if not direct and rng.random() < 0.2:
         words.append("--json")
@@ -65,14 +68,15 @@ def run(case: Case) -> int:
         arguments[name] = _argument(name, value)
     target = arguments.pop("to")
     conversion = pidemu.convert(source, target, **arguments)
-    print(json.dumps(conversion.to_dict(), default=str))
+    json.dumps(conversion.to_dict(), default=str)
     print(conversion)
     return 0
 
 
 def _split(words: tuple[str, ...]) -> tuple[str, dict[str, str], dict[str, Any]]:
     """Return card, settings, and options with their values."""
-    rest, given, options = list(words[2:]), {}, {}
+    rest, given = list(words[2:]), {}
+    options: dict[str, Any] = {}
     while rest:
         word = rest.pop(0)
         if word in ("--assume", "--allow-approximate", "--compensate", "--json"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+from collections.abc import Callable
 from random import Random
 from typing import Final
 
@@ -11,8 +12,8 @@ from tools.fuzz.case import Case, Kind
 from tools.fuzz.corpus.loop_files import corpus
 from tools.fuzz.failures import ROOT
 from tools.fuzz.library import a_card, changed_settings
-from tools.fuzz.phrases import limits, process, scan, span
 from tools.fuzz.mutate import mutated_yaml
+from tools.fuzz.phrases import limits, process, scan, span
 from tools.fuzz.vocabulary import anything, number, text
 
 
@@ -37,7 +38,7 @@ def _random(rng: Random) -> str:
     target, _ = a_card(rng)
     given = dict(word.partition("=")[::2] for word in changed_settings(rng, settings, 0.1))
     lines = [f"card: {card}", f"settings: {_mapping(given)}", f"to: {target}"]
-    more = {
+    more: dict[str, Callable[[], str]] = {
         "process": lambda: json.dumps(process(rng, 0.15)),
         "scan": lambda: f"[{number(rng, 0.2)}, {number(rng, 0.1)}]" if rng.random() < 0.5 else number(rng, 0.2),
         "runs_every": lambda: json.dumps(scan(rng, 0.2)),

@@ -10,11 +10,23 @@ from typing import Final
 
 from tools.fuzz.case import OLD, Case, Kind, Said, command
 from tools.fuzz.corpus.records import corpus
+from tools.fuzz.csv_text import damaged, rows_in
 from tools.fuzz.failures import Breach
-from tools.fuzz.csv_text import Rows, damaged, rows_in
 from tools.fuzz.vocabulary import number, plausible
 
-_OTHERS: Final = ("time", "auto", "manual", "output", "cascade", "track", "external_reset", "feedforward", "hold", "interval", "note")
+_OTHERS: Final = (
+    "time",
+    "auto",
+    "manual",
+    "output",
+    "cascade",
+    "track",
+    "external_reset",
+    "feedforward",
+    "hold",
+    "interval",
+    "note",
+)
 _LINE_ENDS: Final = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x85-\x9f\u2028\u2029]")
 """Characters that no record holds."""
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(inf|infinity|nan)", re.ASCII | re.IGNORECASE)

@@ -58,7 +58,7 @@ def _columns(rng: Random, length: int, wild: float) -> dict[str, list[str]]:
         level += rng.gauss(0, 3)
         pv.append(_float(rng, wild, f"{level:.6g}"))
     columns = {"sp": [_float(rng, wild / 3, s) for s in spells(lambda: str(rng.uniform(20, 80)), 1.0, 30)], "pv": pv}
-    optional = {
+    optional: dict[str, Callable[[], list[str]]] = {
         "auto": lambda: spells(lambda: rng.choice("1110"), 1.0),
         "manual": lambda: spells(lambda: plausible(rng), 0.5),
         "cascade": lambda: spells(lambda: plausible(rng), 0.4),
@@ -83,10 +83,11 @@ def run(case: Case) -> int:
     """Run the record in plain Python scan by scan, at once, and in another engine; compare every bit."""
     import pidemu
     from pidemu.errors import PidemuError
+    from pidemu.words import assignments
 
     words = case.words
     options = {words[i]: words[i + 1] for i in range(len(words) - 1) if words[i].startswith("--")}
-    settings = pidemu.load_card(words[1]).settings(dict(w.split("=", 1) for w in words[2 : words.index("--record")]))
+    settings = pidemu.load_card(words[1]).settings(assignments(words[2 : words.index("--record")]))
     signals = _signals()
     changes = [line.split(" ", 1) for line in case.files.get("changes.txt", b"").decode().splitlines()]
     found: dict[str, Any] = {}
@@ -111,7 +112,7 @@ def _signals() -> dict[str, Floats]:
 def _played(settings: Any, signals: dict[str, Floats], changes: list[list[str]], options: dict[str, str], engine: Any) -> Any:
     """Return outputs, states and events of a controller that had the signals and changes of settings."""
     import pidemu
-    from pidemu.words import pair
+    from pidemu.words import assignments, pair
 
     controller = pidemu.Controller(
         settings, float(options["--scan"]), "direct" if options["--action"] == "direct" else "reverse",
@@ -124,7 +125,7 @@ def _played(settings: Any, signals: dict[str, Floats], changes: list[list[str]],
             outputs.append(controller.run(**{name: x[at:end] for name, x in signals.items()}))
             at = end
         if change:
-            controller.change(dict([change.split("=", 1)]))
+            controller.change(assignments([change]))
     return np.concatenate(outputs), list(controller.state.values()), repr(controller.events)
 
 
@@ -132,7 +133,11 @@ def _compare(first: Any, other: Any, place: str) -> None:
     """Raise `Breach` where two runs differ; NaN is NaN, whatever its bits."""
     if isinstance(first, str) or isinstance(other, str):
         if not (isinstance(first, str) and isinstance(other, str) and first == other):
-            raise Breach("engines disagree", place, f"{first if isinstance(first, str) else 'ran'}; {other if isinstance(other, str) else 'ran'}")
+            raise Breach(
+                "engines disagree",
+                place,
+                f"{first if isinstance(first, str) else 'ran'}; {other if isinstance(other, str) else 'ran'}",
+            )
         return
     for what, one, two in zip(("output", "state"), first[:2], other[:2], strict=True):
         a, b = np.asarray(one, dtype=float), np.asarray(two, dtype=float)

@@ -10,8 +10,8 @@ from typing import Final
 
 from tools.fuzz.case import OLD, Case, Kind, Said, command
 from tools.fuzz.corpus.tables import corpus
-from tools.fuzz.failures import Breach
 from tools.fuzz.csv_text import damaged, rows_in
+from tools.fuzz.failures import Breach
 from tools.fuzz.library import a_card, changed_settings
 from tools.fuzz.phrases import limits, process, step, time
 from tools.fuzz.vocabulary import text
