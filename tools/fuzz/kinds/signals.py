@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import takewhile
 from random import Random
 from typing import Any, Final
 
@@ -87,7 +88,7 @@ def run(case: Case) -> int:
 
     words = case.words
     options = {words[i]: words[i + 1] for i in range(len(words) - 1) if words[i].startswith("--")}
-    settings = pidemu.load_card(words[1]).settings(assignments(words[2 : words.index("--record")]))
+    settings = pidemu.load_card(words[1]).settings(assignments(takewhile(lambda word: not word.startswith("--"), words[2:])))
     signals = _signals()
     changes = [line.split(" ", 1) for line in case.files.get("changes.txt", b"").decode().splitlines()]
     found: dict[str, Any] = {}
