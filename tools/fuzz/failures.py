@@ -7,8 +7,10 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import pidemu
+
 ROOT = Path(__file__).resolve().parent.parent.parent
-_OURS = str(ROOT / "src" / "pidemu")
+_OURS = str(Path(pidemu.__file__).parent)
 
 
 class Breach(Exception):  # noqa: N818  # what it is called is printed
@@ -75,4 +77,5 @@ def place_of(error: BaseException) -> str:
     else:
         file, line = ours[-1].filename, ours[-1].lineno
     path = Path(file)
-    return f"{path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name}:{line}"
+    root = next((r for r in (ROOT, Path(_OURS).parent.parent) if path.is_relative_to(r)), path.parent)
+    return f"{path.relative_to(root).as_posix()}:{line}"
