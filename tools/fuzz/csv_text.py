@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from random import Random
 
@@ -69,7 +70,7 @@ def _add_lines(rng: Random, lines: list[str]) -> None:
 def rows_in(content: bytes, is_empty: str) -> set[int]:
     """Return how many rows a file can be said to have; none where it is not text.
 
-    A row is a line that holds something, after the header; the header is the first such line that is not a comment. A cell in
+    A line ends in a line feed, or in a carriage return where there is no line feed at all. A row is a line that holds something, after the header; the header is the first such line that is not a comment. A cell in
     quotation marks may hold the end of a line, so that there is a second count where there are such marks.
 
     Parameters
@@ -83,7 +84,9 @@ def rows_in(content: bytes, is_empty: str) -> set[int]:
         decoded = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         return set()
-    lines = decoded.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = re.sub("\r+\n", "\n", decoded).split("\n")
+    if "\n" not in decoded:
+        lines = decoded.split("\r")
     counts = {_count(lines, chars) for chars in (is_empty, " \t")}
     if '"' in decoded:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from random import Random
 from typing import Final
 
@@ -18,6 +19,8 @@ from tools.fuzz.vocabulary import text
 
 _MORE: Final = ("scan", "action", "limits", "setpoint", "load", "time")
 _EMPTY: Final = " \t\r,;"
+_FORMULA: Final = re.compile(r"[=@\t\r]|[+-](?![\d.]+(e[+-]?\d+)?$|inf$)", re.IGNORECASE)
+"""What a spreadsheet computes; a number is what it says."""
 _TEXTS: Final = ("tag", "card", "reason")
 
 
@@ -82,7 +85,7 @@ def check(case: Case, said: Said) -> None:
         _check_rows(case.files["loops.csv"], len(rows))
         for name in _TEXTS:
             for row in rows:
-                if (row.get(name) or "").startswith(("=", "+", "-", "@")):
+                if _FORMULA.match(row.get(name) or ""):
                     raise Breach("a formula for spreadsheets", "pidemu fleet --table", f"{name}: {row[name]}")
 
 
