@@ -70,8 +70,9 @@ def _add_lines(rng: Random, lines: list[str]) -> None:
 def rows_in(content: bytes, is_empty: str) -> set[int]:
     """Return how many rows a file can be said to have; none where it is not text.
 
-    A line ends in a line feed, or in a carriage return where there is no line feed at all. A row is a line that holds something, after the header; the header is the first such line that is not a comment. A cell in
-    quotation marks may hold the end of a line, so that there is a second count where there are such marks.
+    A line ends in a line feed, or in a carriage return where there is no line feed at all. A row is a line that holds something,
+    after the header; the header is the first such line that is not a comment. A cell in quotation marks may hold the end of a line,
+    so that there is a second count where there are such marks.
 
     Parameters
     ----------

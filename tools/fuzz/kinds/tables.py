@@ -40,7 +40,7 @@ def make(rng: Random) -> Case:
         words += ["--table", "old.csv" if dice < 0.35 else "loops.csv"]
     elif dice < 0.8:
         words.append("--json")
-    return Case(tuple(words), files, direct=rng.random() < 0.9, limit=2.0 * (1 + len(rows)))
+    return Case(tuple(words), files, direct=rng.random() < 0.95, limit=2.0 * (1 + len(rows)))
 
 
 def _row(rng: Random, at: int, header: list[str]) -> list[str]:
