@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,9 +69,10 @@ def test_a_state_that_is_no_longer_finite_is_reported_once_with_its_scan() -> No
 
 @pytest.mark.parametrize("signal", ["manual", "track"])
 def test_an_output_to_take_over_that_is_larger_than_any_signal_is_refused(signal: str) -> None:
+    far: dict[str, Any] = {signal: 1e300}
     controller = Controller(usual(pidemu.load_card("emerson/deltav")), 1.0)
     with pytest.raises(ScanError, match=r"larger than any signal, 1e\+30"):
-        controller.scan(50.0, 50.0, signal != "manual", **{signal: 1e300})
+        controller.scan(50.0, 50.0, signal != "manual", **far)
     with pytest.raises(ScanError, match=r"is infinite or larger than any signal in sample 1 \(counted from 0\)"):
         controller.run(50.0, 50.0, signal != "manual", **{signal: [50.0, 1e300]})
 

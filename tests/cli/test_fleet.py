@@ -268,7 +268,8 @@ def test_a_folder_that_holds_signals_already_is_refused() -> None:
     status, _, err = said("fleet", "good.csv", "--signals", "kept")
     assert (status, err) == (
         2,
-        "error: kept holds the signals of a fleet already; go on with them (--resume, resume=True), give another folder, or empty it\n",
+        "error: kept holds the signals of a fleet already; go on with them (--resume, resume=True), give another folder, or empty "
+        "it\n",
     )
 
 
