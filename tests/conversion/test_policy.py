@@ -320,6 +320,11 @@ class TestWhatIsTakenForGranted:
         found = asked("epics/epid", {"KP": -2, "KI": 0.1}, "generic/parallel", action="reverse", assume=True)
         assert [q.kind for q in found.questions] == ["action"]
 
+    def test_gains_that_were_not_given_are_turned_as_well_where_the_action_is_right(self) -> None:
+        (question,) = asked("simple-pid/simple-pid", {}, "generic/standard", action="direct").questions
+        assert [dict(answer.given) for answer in question.readings] == [{}, {"Kp": -1.0}]
+        assert all(answer.conversion is not None for answer in question.readings)
+
     @pytest.mark.parametrize(("gain", "action"), [(1, "direct"), (-1, "reverse")])
     def test_positive_feedback_is_refused(self, gain: float, action: str) -> None:
         process = pidemu.Process.from_lags(gain, [100], delay=10)

@@ -67,7 +67,8 @@ def action_questions(source: Settings, request: Request) -> list[Question]:
     carried = carried_action(source)
     if not text or carried is None or request.action is None:
         return []
-    turned = {n: -v.value for n, v in source.items() if v.given and v.role in _SIGNED[source.equation.form is Form.PARALLEL]}
+    signed = _SIGNED[source.equation.form is Form.PARALLEL]
+    turned = {n: -v.value for n, v in source.items() if v.value and v.role in signed and (v.given or not v.off)}
     return [
         Question(
             "action",
