@@ -202,6 +202,14 @@ EQUATIONS: tuple[Case, ...] = (
     ),
     ("reject_bad_numbers", (("[0.05, 1]", "[1, 0.05]"),), ("17:49: range 1 to 0.05 does not ascend",)),
     ("reject_bad_numbers", (("default: 0.125", "default: 2"),), ("17:69: default 2 is outside 0.05 to 1 and is not an off value",)),
+    (
+        "reject_bad_numbers",
+        (("off: 0, default: 0}", "off: 0, default: inf}"),),
+        (
+            "16:54: default inf needs evidence of its own, at 'settings.RATE.default' or 'settings.RATE'",
+            "16:54: default is infinite, which does not go with the derivative; give a number",
+        ),
+    ),
     ("reject_bad_numbers", (("[0, 100]", "[100, 0]"),), ("28:18: output limits 100 to 0 do not ascend",)),
     (
         "reject_bad_numbers",
@@ -625,3 +633,19 @@ def test_a_card_that_names_a_wrong_setting_is_not_loaded(
     with pytest.raises(CardError) as caught:
         loaded(tmp_path, edited(VALID, *edits))
     assert list(expected) == headlines(list(caught.value.problems))
+
+
+def test_numbers_that_cannot_be_computed_with_together_are_refused_where_they_stand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def divided(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("float division by zero")
+
+    card = loaded(tmp_path, VALID.replace("    canonical: {kp: 2, ki: 0.0333333, kd: 32, Tf: 2}", "    outputs: [1]"))
+    monkeypatch.setattr(runs, "Controller", divided)
+    message = "these numbers do not go together: they cannot be computed with"
+    assert headlines(list(runs.reject_wrong_examples(card))) == [f"45:5: {message}"]
+    assert headlines(list(runs.reject_unrunnable(card))) == [
+        f"19:3: with STRUCTURE=PID: {message}",
+        f"19:3: with STRUCTURE=I-PD: {message}",
+    ]

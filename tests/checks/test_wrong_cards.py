@@ -219,6 +219,15 @@ WRONG_NUMBERS: dict[str, Case] = {
     "too small": (("ratio: ALPHA", "ratio: -1e-300"), ("11:56: -1e-300 is not a plausible number",)),
     "among off values": (("off: 0, default", "off: [0, 5e-324], default"), ("16:46: 4.94066e-324 is not a plausible number",)),
     "in an example": (("GAIN: 2, RESET", "GAIN: 1e41, RESET"), ("45:19: 1e+41 is not a plausible number",)),
+    "an infinite step": (("default: 0.125", "default: 0.125, resolution: .inf"), ("17:88: inf is not a finite number",)),
+    "a step too small": (
+        ("default: 0.125", "default: 0.125, resolution: 5e-324"),
+        ("17:88: 4.94066e-324 is not a plausible number",),
+    ),
+    "counts beyond whole numbers": (
+        ("\nevidence:", f"\narithmetic: {{type: integer, counts: 100, gain-counts: {10**298}}}\nevidence:"),
+        (f"29:55: 1{'0' * 39}…{'0' * 20} is more than 1e+09, the largest that makes sense",),
+    ),
     "a scan of no length": (
         ("default: 1 s", "default: 1e-300 ms"),
         ("27:17: '1e-300 ms' is not a plausible scan interval; write it like '1 s'",),

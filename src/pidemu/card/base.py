@@ -74,6 +74,13 @@ Number = Annotated[
 ]
 
 
+Size = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False), AfterValidator(_plausible)]
+"""A number above zero."""
+
+
+Count = Annotated[int, Field(gt=0, le=10**9, strict=True)]
+
+
 Day = Annotated[date, BeforeValidator(_day)]
 
 

@@ -92,6 +92,10 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
         case "too_long":
             most = int(context["max_length"])
             return _wrong_length(most, len(value), most if context.get("field_type") == "Tuple" else 1)
+        case "less_than_equal":
+            return f"{shown} is more than {context['le']:g}, the largest that makes sense"
+        case "finite_number":
+            return f"{shown} is not a finite number"
         case "greater_than":
             return f"{shown} is not above {'zero' if context['gt'] == 0 else context['gt']}"
         case "one_line" | "two_names" | "not_a_number" | "implausible":

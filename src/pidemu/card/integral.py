@@ -103,7 +103,7 @@ class WindupBackCalculation(Model):
 class FastReturn(Model):
     """An integral that comes back faster from beyond limits of its own."""
 
-    factor: Annotated[float, Field(ge=1, strict=True)] = Field(
+    factor: Annotated[float, Field(ge=1, le=1e6, strict=True, allow_inf_nan=False)] = Field(
         description="The integral time is divided by this while the output is beyond one of the limits and the integral on its "
         "way back, until the output is back at that limit."
     )

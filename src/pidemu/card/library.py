@@ -74,7 +74,7 @@ def _found(vendors: Sequence[str | Path]) -> dict[str, tuple[Path, str | None]]:
     found: dict[str, tuple[Path, str | None]] = {}
     for folder in folders(vendors):
         for place, reason in _inside(folder):
-            inside = _inside(place) if reason is None and place.is_dir() else []
+            inside = _inside(place) if reason is None and os.path.isdir(place) else []
             entries = [(place, reason)] if reason is not None else [(f, r) for f, r in inside if r or f.suffix == ".yaml"]
             for file, wrong in entries:
                 card_id = f"{file.parent.name}/{file.stem}"

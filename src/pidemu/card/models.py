@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pidemu.card.base import Evidence, Form, Model, Name, Number, SettingName, Source, Text
+from pidemu.card.base import Evidence, Form, Model, Name, Number, SettingName, Size, Source, Text
 from pidemu.card.integral import Integral
 from pidemu.card.stages import Action, Arithmetic, Faults, Output, Scan, Transfer
 from pidemu.card.terms import Cascade, Derivative, ErrorShape, Feedforward, Measurement, Proportional, Setpoint
@@ -46,9 +46,7 @@ class Setting(Model):
         default="loop",
         description="`module`: a setting that many loops share; conversions leave it at its default unless told otherwise.",
     )
-    resolution: Annotated[float, Field(gt=0, strict=True)] | None = Field(
-        default=None, description="Smallest step of the dial, in `unit`."
-    )
+    resolution: Size | None = Field(default=None, description="Smallest step of the dial, in `unit`.")
 
 
 class Option(Model):

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from pidemu.card.base import Flag, Model, Name, Number, Reference
+from pidemu.card.base import Count, Flag, Model, Name, Number, Reference
 
 STARTS: Final = {
     "bumpless": "does not bump",
@@ -104,11 +104,11 @@ class Arithmetic(Model):
         description="With `float32`: the width of the numbers written in the program; an operation with a `float64` literal is "
         "computed in float64 until it is stored.",
     )
-    counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
+    counts: Count | None = Field(
         default=None,
         description="With `integer`: counts per percent of setpoint, measurement and output; 100 where 10000 counts are 100 %.",
     )
-    gain_counts: Annotated[int, Field(gt=0, strict=True)] | None = Field(
+    gain_counts: Count | None = Field(
         default=None, description="With `integer`: counts per unit of the gain; 100 where a dial of 1.00 is 100 counts."
     )
 

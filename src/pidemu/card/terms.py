@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from pidemu.card.base import Flag, GeneralRule, Model, Number, Reference, Rule, SettingName
+from pidemu.card.base import Flag, GeneralRule, Model, Number, Reference, Rule, SettingName, Size
 
 
 class Proportional(Model):
@@ -104,9 +104,7 @@ class ErrorShape(Model):
         default="inside", description="With `gap`: whether an error of exactly the band is inside it."
     )
     linearity: Reference | None = Field(default=None, description="L, with `gain-linear`: a number, or the name of a setting.")
-    over: Annotated[float, Field(gt=0, strict=True)] = Field(
-        default=100.0, description="The |e| at which `squared` and `gain-linear` have gain 1 [as the measurement]."
-    )
+    over: Size = Field(default=100.0, description="The |e| at which `squared` and `gain-linear` have gain 1 [as the measurement].")
     on: Literal["error", "proportional", "integral"] = Field(
         default="error",
         description="Which terms the shape counts for: P and I alike, or one of them. The derivative never sees it.",

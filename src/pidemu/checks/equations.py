@@ -45,6 +45,8 @@ _SHORTEST_SCAN: Final = 1e-6
 _LONGEST_SCAN: Final = 1e6
 """Plausible scan intervals [s]."""
 _RATES: Final = ("output-rate", "setpoint-rate")
+_UNLIMITED: Final = (*_RATES, "integral-limit", "windup-limit")
+"""What may be infinite."""
 
 
 def reject_bad_units(variant: Variant) -> Iterator[Problem]:
@@ -105,6 +107,8 @@ def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
         low, high = limits(s)
         if not low < high:
             yield document.problem((*home, "range"), f"range {low:g} to {high:g} does not ascend")
+        elif s.default is not None and math.isinf(s.default) and s.default not in off_values(s) and s.sets not in _UNLIMITED:
+            yield document.problem((*home, "default"), f"default is infinite, which does not go with the {s.sets}; give a number")
         elif s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
             yield document.problem(
                 (*home, "default"), f"default {s.default:g} is outside {low:g} to {high:g} and is not an off value"

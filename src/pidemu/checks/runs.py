@@ -27,6 +27,8 @@ _ERROR: Final = 7.31
 """A constant error [%] that P alone does not reach a limit with, at a gain of 1."""
 _INCREMENT: Final = 0.317
 """What it moves the integral by in one scan [%]; no whole number of them reaches a limit."""
+_FAILURES: Final = (PidemuError, ArithmeticError)
+"""What computing with a card may end in: its numbers may each be plausible and not go together."""
 _CONSTANT: Final = 1000
 """Scans for which the error stays: five times what reaching the limit takes."""
 
@@ -43,9 +45,13 @@ def reject_wrong_examples(card: Card) -> Iterator[Problem]:
                 yield from _wrong_gains(card, i, settings, example.canonical)
             if example.outputs:
                 yield from _wrong_outputs(card, i, settings, example.outputs)
-        except PidemuError as error:
-            for line in str(error).splitlines():
+        except _FAILURES as error:
+            for line in _told(error).splitlines():
                 yield card.document.problem((*place, "given"), line, at_key=True)
+
+
+def _told(error: Exception) -> str:
+    return str(error) if isinstance(error, PidemuError) else "these numbers do not go together: they cannot be computed with"
 
 
 def _wrong_gains(card: Card, i: int, settings: Settings, stated: Canonical) -> Iterator[Problem]:
@@ -86,9 +92,9 @@ def reject_unrunnable(card: Card) -> Iterator[Problem]:
             Controller(plausible(variant)).scan(50.0, 49.0)
         except UndefinedError:
             continue
-        except PidemuError as error:
+        except _FAILURES as error:
             chosen = variant.choice_text
-            message = f"with {chosen}: {error}" if chosen else str(error)
+            message = f"with {chosen}: {_told(error)}" if chosen else _told(error)
             yield card.document.problem(("options",) if chosen else ("settings",), message)
 
 
@@ -103,7 +109,7 @@ def reject_windup_that_stops_short(card: Card) -> Iterator[Problem]:
             continue
         try:
             reached = farthest(plausible(variant).algorithm())
-        except PidemuError:
+        except _FAILURES:
             continue  # not defined, or refused by another rule
         if reached is not None and reached != (0.0, 100.0):
             seen.add(home)
