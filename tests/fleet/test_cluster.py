@@ -18,6 +18,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop
+from pidemu.cache import warn
 from pidemu.fleet import cluster as on_cluster
 from pidemu.fleet.loops import Plan
 from pidemu.fleet.progress import Progress
@@ -147,6 +148,63 @@ def test_where_the_cluster_is_lost_what_is_done_is_kept_and_the_rest_has_failed(
     assert set(result.failures.values()) == {"the cluster was lost; run the loop again"}
     place = result.status.index("done")
     assert result.columns["error"][place] == alone(result.loops[place], **STEPS).error[-1]
+
+
+def test_a_cluster_without_workers_is_said_and_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr(on_cluster, "_QUIET", 0.3)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.1)
+    warn.cache_clear()
+    with local_cluster(n_workers=0) as own:
+        address = own.scheduler_address
+        result = Fleet(alike(3)).simulate(**STEPS, cluster=own, worker_timeout=0.8)
+    assert set(result.failures.values()) == {
+        "the cluster had no worker for 0.8 s; start some with 'dask worker', and run the loop again"
+    }
+    assert result.counts == {"failed": 3}
+    said = f"note: {address} has no workers; waiting until there have been none for 0.8 s; 'dask worker ADDRESS' starts one"
+    assert [message for message in caplog.messages if message.startswith("note:")] == [said]
+
+
+@pytest.mark.parametrize("timeout", [0.0, 60.0])
+def test_a_worker_that_comes_late_runs_the_loops(timeout: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_cluster, "_QUIET", 0.2)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.05)
+    said: list[str] = []
+    with local_cluster(n_workers=0, processes=False) as own:
+
+        def late(message: str) -> None:
+            said.append(message)
+            own.scale(1)
+
+        monkeypatch.setattr(on_cluster, "warn", late)
+        result = Fleet(alike(3)).simulate(**STEPS, cluster=own, worker_timeout=timeout)
+    assert result.counts == {"done": 3}
+    end = "waiting until there have been none for 60 s" if timeout else "waiting for one"
+    assert len(said) == 1
+    assert f"has no workers; {end}; 'dask worker ADDRESS' starts one" in said[0]
+
+
+def test_where_all_workers_have_gone_what_is_done_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_cluster, "_FIRST", 8)
+    monkeypatch.setattr(on_cluster, "_next_size", lambda *_: 8)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.05)
+    gone: list[bool] = []
+    advance = Progress.advance
+    with local_cluster(n_workers=1, processes=False) as own:
+
+        def going(self: Progress, count: int) -> None:
+            advance(self, count)
+            if not gone:
+                gone.append(True)
+                own.scale(0)
+
+        monkeypatch.setattr(Progress, "advance", going)
+        result = Fleet(alike(400)).simulate(**STEPS, cluster=own, worker_timeout=0.5)
+    assert 0 < result.counts["done"] < 400
+    assert result.counts["done"] + result.counts["failed"] == 400
+    assert set(result.failures.values()) == {
+        "the cluster had no worker for 0.5 s; start some with 'dask worker', and run the loop again"
+    }
 
 
 def test_what_a_worker_cannot_run_is_reported(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,9 +23,9 @@ from pidemu import Fleet, FleetError, FleetResult, Loop, Simulation
 from pidemu.engines import Engine
 from pidemu.fleet import local
 from pidemu.fleet.blocks import COLUMNS
-from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.finished import FIELDS
 from pidemu.fleet.folder import INDEX
+from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.signals import SignalStore
 from tests.fleet.support import EVERY_ENGINE, alike, alone, check_signals, few
 
