@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
@@ -14,7 +15,7 @@ import pidemu
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
 from pidemu.plots import check_picture, plot_comparison, plot_run
-from pidemu.record.files import Record
+from pidemu.record.files import Floats, Record
 from pidemu.record.playback import play
 from tests.cli.helpers import Said, said
 
@@ -110,6 +111,37 @@ def test_a_single_sample_and_outputs_that_are_no_numbers_can_be_drawn(folder: Pa
     plot_run(folder / "x.png", settings, record, play(Controller(settings, 1.0), record, "r"), (-np.inf, np.inf))
     plot_comparison(folder / "y.png", pidemu.compare([settings, settings], record))
     assert (folder / "x.png").stat().st_size > 10_000 < (folder / "y.png").stat().st_size
+
+
+HUGE = np.array([1e308, -1e308, 50.0, np.nan, 1.7e308, -1.7e308, 60.0])
+
+
+@pytest.mark.parametrize("values", [HUGE, np.full(7, 1e308), np.array([50.0] * 6 + [-1.7e308])], ids=["mixed", "all", "one"])
+def test_signals_near_the_largest_number_can_be_drawn(folder: Path, values: Floats) -> None:
+    settings = pidemu.load_card("generic/standard").settings(K=2, Ti=50)
+    for record in (Record(values, -values, output=values), Record(np.full(7, 50.0), values, cascade=values)):
+        played = play(Controller(settings, 1.0, initial_output=50.0), record, "r")
+        plot_run(folder / "x.png", settings, record, played, (-1e308, 1e308))
+        assert (folder / "x.png").stat().st_size > 10_000
+    plot_comparison(folder / "y.png", pidemu.compare([settings, settings], Record(values, -values), initial_output=50.0))
+    assert (folder / "y.png").stat().st_size > 10_000
+
+
+def test_a_dollar_sign_is_one_and_what_is_not_seen_is_written_out(folder: Path) -> None:
+    settings = pidemu.load_card("generic/standard").settings(K=2, Ti=50)
+    comparison = pidemu.compare([settings, settings])
+    runs = tuple(replace(run, label=label) for run, label in zip(comparison.runs, ("$x^{$", "a$b$\x1b"), strict=True))
+    plot_comparison(folder / "x.svg", replace(comparison, runs=runs))
+    words = text_of(folder / "x.svg")
+    assert "<!-- $x^{$: K=2 %/%" in words
+    assert "a$b$\\x1b: K=2 %/%" in words
+    assert "\x1b" not in words
+
+
+def test_a_picture_that_is_refused_leaves_the_old_one(folder: Path) -> None:
+    (folder / "x.svg").write_text("old", encoding="utf-8")
+    assert said(*RUN, "--limits", "5,5", "--plot", "x.svg").status == 2
+    assert text_of(folder / "x.svg") == "old"
 
 
 @pytest.mark.parametrize("name", ["x.pdf", "x", "x.png.txt", "png"])

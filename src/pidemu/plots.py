@@ -13,6 +13,8 @@ import numpy as np
 from pidemu.comparison.compare import Comparison
 from pidemu.comparison.side_by_side import dials
 from pidemu.errors import PidemuError
+from pidemu.excerpt import visible
+from pidemu.files.writing import beside
 from pidemu.record.files import Floats, Record
 from pidemu.record.playback import Playback, modes, spells
 from pidemu.record.standard import StandardRecord
@@ -27,9 +29,13 @@ _COLOURS: Final = ("#0b6bb8", "#d1571c", "#3a8f3d", "#8a4fa3", "#a07a12", "#c240
 _SETPOINT, _PV, _QUIET = "#444444", "#0b6bb8", "#777777"
 _MANY: Final = 20_000
 """Samples from which a line becomes an image within an SVG."""
+_LARGEST: Final = 1e100
+"""No larger value is drawn: the ends of an axis, and what lies between them, are to be numbers."""
 _SHADES: Final[Mapping[str, str]] = {"manual": "#f0e6c8", "tracking": "#dcebdc", "hold": "#e4e4e4"}
 _STYLE: Final = {
     "svg.hashsalt": "pidemu",  # the same picture gives the same file
+    "text.parse_math": False,  # a dollar sign is one
+    "text.usetex": False,
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -56,7 +62,7 @@ def check_picture(path: str | Path) -> None:
         The file's ending is neither ``.png`` nor ``.svg``, or matplotlib is not installed.
     """
     if Path(path).suffix.lower() not in ENDINGS:
-        raise PidemuError(f"{path}: pictures are written as .png or .svg; give the file such an ending")
+        raise PidemuError(f"{visible(str(path))}: pictures are written as .png or .svg; give the file such an ending")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:
@@ -83,6 +89,10 @@ def plot_run(path: str | Path, settings: Settings, record: Record, playback: Pla
     ------
     PidemuError
         As `check_picture`, or the file cannot be written.
+
+    Notes
+    -----
+    Where a signal is no number, or larger than 1e100, there is a gap.
     """
     check_picture(path)
     t, unit = playback.times, "%" if settings.equation.signals == "percent" else "units"
@@ -93,9 +103,10 @@ def plot_run(path: str | Path, settings: Settings, record: Record, playback: Pla
         outputs: list[Curve] = [("emulated", playback.outputs, {"color": _COLOURS[1]})]
         if recorded and record.output is not None:
             outputs.insert(0, ("recorded", record.output, {"color": "#222222", "linewidth": 2.4, "alpha": 0.35}))
-            _line(axes[2], t, playback.outputs - record.output, color=_COLOURS[1])
+            difference = _less(playback.outputs, record.output)
+            _line(axes[2], t, difference, color=_COLOURS[1])
             axes[2].set_ylabel(f"emulated −\nrecorded [{unit}]")
-            _window(axes[2], [playback.outputs - record.output], (), least=0.1)
+            _window(axes[2], [difference], (), least=0.1)
         for label, values, look in outputs:
             _line(axes[1], t, values, label=label, **look)
         axes[1].set_ylabel(f"output [{unit}]")
@@ -119,7 +130,7 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
         As `check_picture`, or the file cannot be written.
     """
     check_picture(path)
-    t, outputs = comparison.times, comparison.outputs
+    t, outputs = comparison.times, {visible(label): values for label, values in comparison.outputs.items()}
     first, *others = outputs
     with _style():
         figure, axes = _panels((2.4, 3, 2), "\n".join(f"{run.label}: {dials(run.settings)}" for run in comparison.runs))
@@ -128,11 +139,11 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
             look = {"linewidth": 1.2} if i else {"linewidth": 2.6, "alpha": 0.45}
             _line(axes[1], t, values, label=label, color=_COLOURS[i % len(_COLOURS)], **look)
             if i:
-                _line(axes[2], t, values - outputs[first], label=label, color=_COLOURS[i % len(_COLOURS)], linewidth=1.2)
+                _line(axes[2], t, _less(values, outputs[first]), label=label, color=_COLOURS[i % len(_COLOURS)], linewidth=1.2)
         axes[1].set_ylabel("output [%]")
         _window(axes[1], list(outputs.values()), comparison.runs[0].limits)
         axes[2].set_ylabel(f"difference from\n{first} [%]")
-        _window(axes[2], [outputs[label] - outputs[first] for label in others], (), least=0.1)
+        _window(axes[2], [_less(outputs[label], outputs[first]) for label in others], (), least=0.1)
         _segments(axes, comparison)
         _finish(figure, axes, t, comparison.record, path)
 
@@ -147,7 +158,7 @@ def _panels(heights: Sequence[float], title: str) -> tuple[Figure, list[Axes]]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    lines = [part for line in title.splitlines() for part in textwrap.wrap(line, 118, subsequent_indent="    ")]
+    lines = [part for line in map(visible, title.split("\n")) for part in textwrap.wrap(line, 118, subsequent_indent="    ")]
     figure = Figure(figsize=(9, 0.9 * sum(heights) + 0.2 * len(lines) + 0.6), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=list(heights), squeeze=False)[:, 0]
@@ -170,8 +181,18 @@ def _signals(axis: Axes, t: Floats, record: Record, unit: str) -> None:
 
 def _line(axis: Axes, t: Floats, values: Floats, **look: Any) -> None:
     """Draw values that hold from scan to scan; the last one to the end of its scan."""
-    finite = np.where(np.isfinite(values), values, np.nan)
+    finite = _drawn(values)
     axis.plot(np.append(t, _end(t)), np.append(finite, finite[-1]), drawstyle="steps-post", rasterized=t.size > _MANY, **look)
+
+
+def _drawn(values: Floats) -> Floats:
+    """Return values, NaN for what cannot be drawn."""
+    return np.where(np.isfinite(values) & (np.abs(values) <= _LARGEST), values, np.nan)
+
+
+def _less(values: Floats, others: Floats) -> Floats:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return values - others
 
 
 def _end(t: Floats) -> float:
@@ -181,7 +202,7 @@ def _end(t: Floats) -> float:
 
 def _window(axis: Axes, curves: Iterable[Floats], limits: Sequence[float], least: float = 0.1) -> None:
     """Show what the curves cover, with some room; output limits, dashed, where the curves come near."""
-    found = np.concatenate([c[np.isfinite(c)] for c in curves])
+    found = np.concatenate([c[np.isfinite(c)] for c in map(_drawn, curves)])
     low, high = (float(found.min()), float(found.max())) if found.size else (0.0, 1.0)
     room = max(high - low, least)
     margin = max(0.07 * (high - low), 0.5 * least)
@@ -223,7 +244,5 @@ def _finish(figure: Figure, axes: Sequence[Axes], t: Floats, record: Record, pat
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(float(t[0]), _end(t))
     svg = Path(path).suffix.lower() == ".svg"
-    try:
-        figure.savefig(path, format="svg" if svg else "png", dpi=150, metadata={"Date": None} if svg else None)
-    except OSError as error:
-        raise PidemuError(f"{path}: cannot be written: {error.strerror}") from None
+    with beside(path, PidemuError, binary=True) as stream:
+        figure.savefig(stream, format="svg" if svg else "png", dpi=150, metadata={"Date": None} if svg else None)

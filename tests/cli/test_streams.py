@@ -127,9 +127,10 @@ def test_a_file_that_is_overwritten_must_not_be_read(folder: Path) -> None:
         assert (status, out) == (2, "")
         assert err == "error: record.csv: is read, too, as record.csv; give another file for the result\n"
     (folder / "loops.csv").write_text("tag,card,settings,process\nA,generic/standard,K=2; Ti=10,gain=1\n", encoding="utf-8")
-    status, out, err = said("fleet", "loops.csv", "--table", "./loops.csv")
-    assert (status, out) == (2, "")
-    assert err == "error: ./loops.csv: is read, too, as loops.csv; give another file for the result\n"
+    for option in ("--table", "--parquet"):
+        status, out, err = said("fleet", "loops.csv", option, "./loops.csv")
+        assert (status, out) == (2, "")
+        assert err == "error: ./loops.csv: is read, too, as loops.csv; give another file for the result\n"
     assert (folder / "record.csv").read_text(encoding="utf-8") == text
 
 
@@ -180,7 +181,7 @@ def test_the_errors_of_a_loop_file_speak_of_a_loop_file(folder: Path, text: str,
     assert message in err
 
 
-@POSIX
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
 def test_a_name_that_is_not_utf_8_is_read_and_written(folder: Path) -> None:
     record, target = (os.fsdecode(name) for name in (b"K\xfchler.csv", b"Erg\xe4nzt.csv"))
     (folder / record).write_text("# a\nsp,pv\n1,2\n", encoding="utf-8")

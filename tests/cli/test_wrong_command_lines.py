@@ -119,7 +119,7 @@ SETTINGS = {
 
 RUNS = {
     f"run {_PI} --record none.csv": "none.csv: cannot be read: No such file or directory",
-    f"run {_PI} --record empty": "empty: cannot be read: Is a directory",
+    f"run {_PI} --record empty": "empty: cannot be read: it is a folder",
     f"run {_PI} --record good.csv --scan 0": "scan interval 0 s is not a positive number",
     f"run {_PI} --record good.csv --scan inf": "scan interval inf s is not a positive number",
     f"run {_PI} --record good.csv --limits 100,0": "output limits 100 to 0 are not a range; give low, then high",
@@ -127,7 +127,7 @@ RUNS = {
     f"run {_PI} --record good.csv --initial-output nan": "the initial output nan is not a finite number",
     "run generic/standard K=2 Ti=off --record good.csv --bias nan": "the bias nan is not a finite number",
     f"run {_PI} --record good.csv -o nowhere/out.csv": "nowhere/out.csv: cannot be written: No such file or directory",
-    f"run {_PI} --record good.csv -o empty": "empty: cannot be written: Is a directory",
+    f"run {_PI} --record good.csv -o empty": "empty: cannot be written: it is a folder",
     f"code {_PI} --scan -1": "scan interval -1 s is not a positive number",
     f"code {_PI} --limits 3,1": "output limits 3 to 1 are not a range; give low, then high",
 }
@@ -218,7 +218,7 @@ def test_a_record_that_cannot_be_used_is_refused_with_line_and_column(text: str,
 
 def test_a_record_in_another_encoding_is_refused(folder: Path) -> None:
     (folder / "bad.csv").write_bytes("sp,pv,Störung\n1,2,3\n".encode("latin-1"))
-    message = error("bad.csv: not UTF-8 text; save the file as UTF-8")
+    message = error("bad.csv:1:9: not UTF-8 text (byte 0xF6); save the file as UTF-8")
     assert said("run", *_PI.split(), "--record", "bad.csv") == Said(2, "", message)
 
 

@@ -91,6 +91,25 @@ except RecordError as error:
     assert names(tmp_path) == ["a.csv"]
 
 
+@POSIX
+def test_a_process_that_is_killed_leaves_the_old_file(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", "old")
+    program = f"""
+import os, signal
+from pidemu.errors import RecordError
+from pidemu.files.writing import beside
+with beside({str(tmp_path / "a.csv")!r}, RecordError) as stream:
+    stream.write("half")
+    stream.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    assert subprocess.run([sys.executable, "-c", program], check=False, timeout=60).returncode == -9
+    assert (tmp_path / "a.csv").read_text() == "old"
+    (rest,) = (path for path in tmp_path.iterdir() if path.name != "a.csv")
+    assert rest.name.startswith(".a.csv.")
+    assert rest.name.endswith(".unfinished")
+
+
 def test_a_file_that_is_read_is_not_written_by_whatever_name(tmp_path: Path) -> None:
     record, link, hard = tmp_path / "r.csv", tmp_path / "link.csv", tmp_path / "hard.csv"
     write(record, "old")
@@ -182,7 +201,7 @@ def test_a_protected_file_is_not_replaced(tmp_path: Path) -> None:
     assert message(tmp_path / "a.csv") == f"{tmp_path / 'a.csv'}: cannot be written: Permission denied"
 
 
-@POSIX
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
 def test_a_name_that_is_not_utf_8_and_a_long_one_are_written(tmp_path: Path) -> None:
     for name in (b"K\xfchler.csv", b"x" * 250):
         write(tmp_path / os.fsdecode(name), "text")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from importlib import import_module
 from typing import Final
@@ -101,8 +102,9 @@ def _status(arguments: list[str] | None) -> object:
     except click.exceptions.Abort:
         return interrupts.status()
     except click.ClickException as error:
-        error.message = printable(error.message)
-        error.show()
+        shown = io.StringIO()
+        error.show(shown)
+        click.echo(printable(shown.getvalue()), err=True, nl=False)
         return error.exit_code
     except Exception as error:
         return _report(error)

@@ -103,8 +103,9 @@ def command(
         echo(f"note: {file}: {loops.skipped}", err=True)
     for wrong in loops.wrong:
         echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
-    if target is not None:
-        check(target, FleetError, [file])  # now, and not after the work
+    for path in (target, parquet):
+        if path is not None:  # now, and not after the work
+            check(path, FleetError, [file])
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(
