@@ -20,6 +20,7 @@ import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop
 from pidemu.cache import warn
 from pidemu.fleet import cluster as on_cluster
+from pidemu.fleet.cluster import run_chunk
 from pidemu.fleet.loops import Plan
 from pidemu.fleet.progress import Progress
 from tests.fleet.support import alike, alone, check_signals, few
@@ -211,6 +212,23 @@ def test_what_a_worker_cannot_run_is_reported(cluster: Any, monkeypatch: pytest.
     monkeypatch.setattr(on_cluster, "run_chunk", broken)
     result = Fleet(alike(2)).simulate(**STEPS, cluster=cluster)
     assert result.failures == {f"L{i}": "the cluster could not run it: 2 loops too many" for i in range(2)}
+
+
+def test_a_loop_that_ends_whatever_runs_it_costs_itself_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dask import config
+
+    monkeypatch.setattr(on_cluster, "run_chunk", deadly)
+    with config.set({"distributed.scheduler.allowed-failures": 0}), local_cluster(n_workers=1) as own:
+        result = Fleet(alike(6)).simulate(**STEPS, cluster=own)
+    assert result.counts == {"done": 5, "failed": 1}
+    assert list(result.failures) == ["L4"]
+    assert result.failures["L4"].startswith("the cluster could not run it: ")
+
+
+def deadly(chunk: list[Any], plan: Plan) -> Any:
+    if any(loop.tag == "L4" for _, loop in chunk):
+        os._exit(1)
+    return run_chunk(chunk, plan)
 
 
 def broken(chunk: list[Any], plan: Plan) -> None:

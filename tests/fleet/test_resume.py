@@ -211,7 +211,8 @@ def test_a_folder_of_another_fleet_is_refused_and_stays(tmp_path: Path, monkeypa
         (alike(8, scan=0.25), STEPS),
     ]
     for others, steps in changed:
-        for where in ({"folder": tmp_path / "f"}, {"parquet": tmp_path / "p.parquet"}):
+        places: list[dict[str, Any]] = [{"folder": tmp_path / "f"}, {"parquet": tmp_path / "p.parquet"}]
+        for where in places:
             with pytest.raises(FleetError, match=r"none of the loops in .* is one of this fleet as it is run now"):
                 Fleet(others).simulate(**steps, **where, resume=True)
     monkeypatch.setattr(finished, "__version__", "0.0.9")
@@ -246,10 +247,10 @@ def test_the_key_of_a_loop_depends_on_all_that_its_numbers_do_and_on_nothing_els
         replace(loop, settings=pidemu.load_card("generic/standard", [tmp_path]).settings(K=0.5, Ti=8.0, Td=0.4, Tf=0.2)),
         replace(loop, settings=pidemu.load_card("generic/standard").settings(K=0.5, Ti=8.0, Td=0.4, Tf=0.2, pv_range=(0, 50))),
         replace(loop, process=Process.from_lags(0.9, [5.0], delay=2.1)),
-        *(
-            replace(loop, **{name: value})
-            for name, value in (("scan", 0.25), ("setpoint", 5.0), ("load", (3.0, 1.0)), ("time", 9.0))
-        ),
+        replace(loop, scan=0.25),
+        replace(loop, setpoint=5.0),
+        replace(loop, load=(3.0, 1.0)),
+        replace(loop, time=9.0),
         replace(loop, action="direct"),
         replace(loop, output_limits=(0, 90)),
         replace(loop, initial=(50, 50, 40)),
