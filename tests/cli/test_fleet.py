@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import signal
 import subprocess
 import sys
@@ -266,11 +267,66 @@ def test_what_cannot_be_done_is_said_with_status_2(line: str, message: str, fold
 def test_a_folder_that_holds_signals_already_is_refused() -> None:
     told("fleet", "good.csv", "--signals", "kept")
     status, _, err = said("fleet", "good.csv", "--signals", "kept")
-    assert (status, err) == (
-        2,
-        "error: kept holds the signals of a fleet already; go on with them (--resume, resume=True), give another folder, or empty "
-        "it\n",
-    )
+    remedy = "go on with them (--resume, resume=True), give another folder, or empty it"
+    assert (status, err) == (2, f"error: kept holds the signals of a fleet already; {remedy}\n")
+
+
+def test_a_run_that_did_not_end_is_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    add = FleetResult.add
+
+    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+        if "done" in self.status:
+            raise KeyboardInterrupt
+        return add(self, found)
+
+    words = ("fleet", "loops.csv", "--signals", "kept", "--parquet", "kept.parquet", "--table", "out.csv", "--engine", "python")
+    whole = "fleet loops.csv --table whole.csv --engine python"
+    said(*whole.split())
+    with monkeypatch.context() as patch:
+        patch.setattr(FleetResult, "add", interrupted)
+        assert said(*words, "--cores", "1").status == 130
+    status, out, err = said(*words, "--resume", "--json")
+    assert (status, strict_json(out)["resumed"]) == (1, 2)  # two rows are wrong; the second loop was written, if not shown
+    assert err.splitlines()[-1] == "resumed: 2 of 4 loops were done already"
+    assert rows("out.csv") == rows("whole.csv")
+
+
+def test_there_must_be_something_to_go_on_with() -> None:
+    status, _, err = said("fleet", "good.csv", "--resume")
+    assert (status, err.partition(";")[0]) == (
+        2, "error: there is nothing to go on with: what is done is kept where signals go to files",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", ["emptied", "cut short", "a bit turned"])
+def test_a_damaged_cache_is_no_matter_to_a_fleet(damage: str, folder: Path) -> None:
+    """With Numba's own files it ended with status 130 and without a word."""
+    pytest.importorskip("numba")
+    (folder / "long.csv").write_text(HEAD + SLOW.replace(",1,\n", ",1,1e7\n"), encoding="utf-8")
+    command = [sys.executable, "-m", "pidemu", "fleet", "long.csv", "-v", "--table", "out.csv"]
+    environment = {**os.environ, "PIDEMU_CACHE": str(folder / "code")}
+    found = []
+    for _ in range(2):
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "engine: numba (1 loop)" in done.stdout
+        found.append((done.stdout, rows("out.csv")))
+        for path in (folder / "code").rglob("*.numba"):
+            sound = path.read_bytes()
+            middle = len(sound) // 2
+            turned = sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :]
+            path.write_bytes({"emptied": b"", "cut short": sound[:middle], "a bit turned": turned}[damage])
+    assert found[0] == found[1]
+
+
+def test_a_card_with_a_name_longer_than_that_of_any_file_costs_its_row(folder: Path) -> None:
+    cards = ("generic/" + "x" * 300, "y" * 5000 + ".yaml")
+    lines = [FAST.replace("FIC-1", f"LONG-{i}").replace("generic/standard", card) for i, card in enumerate(cards)]
+    (folder / "names.csv").write_text(HEAD + FAST + "".join(lines), encoding="utf-8")
+    status, out, err = said("fleet", "names.csv")
+    assert (status, out.splitlines()[0]) == (1, "names.csv: 3 loops, 1 done, 2 failed; 1 not settled at the end")
+    assert [line.partition(": no ")[0] for line in err.splitlines()] == ["names.csv:3: LONG-0", "names.csv:4: LONG-1"]
+    assert max(map(len, (out + err).splitlines())) < 2500
 
 
 def test_cores_and_a_scheduler_are_one_too_many() -> None:

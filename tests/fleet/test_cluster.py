@@ -18,7 +18,9 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop
+from pidemu.cache import warn
 from pidemu.fleet import cluster as on_cluster
+from pidemu.fleet.cluster import run_chunk
 from pidemu.fleet.loops import Plan
 from pidemu.fleet.progress import Progress
 from tests.fleet.support import alike, alone, check_signals, few
@@ -149,10 +151,84 @@ def test_where_the_cluster_is_lost_what_is_done_is_kept_and_the_rest_has_failed(
     assert result.columns["error"][place] == alone(result.loops[place], **STEPS).error[-1]
 
 
+def test_a_cluster_without_workers_is_said_and_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr(on_cluster, "_QUIET", 0.3)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.1)
+    warn.cache_clear()
+    with local_cluster(n_workers=0) as own:
+        address = own.scheduler_address
+        result = Fleet(alike(3)).simulate(**STEPS, cluster=own, worker_timeout=0.8)
+    assert set(result.failures.values()) == {
+        "the cluster had no worker for 0.8 s; start some with 'dask worker', and run the loop again"
+    }
+    assert result.counts == {"failed": 3}
+    said = f"note: {address} has no workers; waiting until there have been none for 0.8 s; 'dask worker ADDRESS' starts one"
+    assert [message for message in caplog.messages if message.startswith("note:")] == [said]
+
+
+@pytest.mark.parametrize("timeout", [0.0, 60.0])
+def test_a_worker_that_comes_late_runs_the_loops(timeout: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_cluster, "_QUIET", 0.2)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.05)
+    said: list[str] = []
+    with local_cluster(n_workers=0, processes=False) as own:
+
+        def late(message: str) -> None:
+            said.append(message)
+            own.scale(1)
+
+        monkeypatch.setattr(on_cluster, "warn", late)
+        result = Fleet(alike(3)).simulate(**STEPS, cluster=own, worker_timeout=timeout)
+    assert result.counts == {"done": 3}
+    end = "waiting until there have been none for 60 s" if timeout else "waiting for one"
+    assert len(said) == 1
+    assert f"has no workers; {end}; 'dask worker ADDRESS' starts one" in said[0]
+
+
+def test_where_all_workers_have_gone_what_is_done_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_cluster, "_FIRST", 8)
+    monkeypatch.setattr(on_cluster, "_next_size", lambda *_: 8)
+    monkeypatch.setattr(on_cluster, "_LOOK", 0.05)
+    gone: list[bool] = []
+    advance = Progress.advance
+    with local_cluster(n_workers=1, processes=False) as own:
+
+        def going(self: Progress, count: int) -> None:
+            advance(self, count)
+            if not gone:
+                gone.append(True)
+                own.scale(0)
+
+        monkeypatch.setattr(Progress, "advance", going)
+        result = Fleet(alike(400)).simulate(**STEPS, cluster=own, worker_timeout=0.5)
+    assert 0 < result.counts["done"] < 400
+    assert result.counts["done"] + result.counts["failed"] == 400
+    assert set(result.failures.values()) == {
+        "the cluster had no worker for 0.5 s; start some with 'dask worker', and run the loop again"
+    }
+
+
 def test_what_a_worker_cannot_run_is_reported(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(on_cluster, "run_chunk", broken)
     result = Fleet(alike(2)).simulate(**STEPS, cluster=cluster)
     assert result.failures == {f"L{i}": "the cluster could not run it: 2 loops too many" for i in range(2)}
+
+
+def test_a_loop_that_ends_whatever_runs_it_costs_itself_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dask import config
+
+    monkeypatch.setattr(on_cluster, "run_chunk", deadly)
+    with config.set({"distributed.scheduler.allowed-failures": 0}), local_cluster(n_workers=1) as own:
+        result = Fleet(alike(6)).simulate(**STEPS, cluster=own)
+    assert result.counts == {"done": 5, "failed": 1}
+    assert list(result.failures) == ["L4"]
+    assert result.failures["L4"].startswith("the cluster could not run it: ")
+
+
+def deadly(chunk: list[Any], plan: Plan) -> Any:
+    if any(loop.tag == "L4" for _, loop in chunk):
+        os._exit(1)
+    return run_chunk(chunk, plan)
 
 
 def broken(chunk: list[Any], plan: Plan) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import pidemu
 from pidemu.errors import CardNotFoundError, FleetError
+from pidemu.fleet import table
 from pidemu.fleet.result import HEADER
 from pidemu.fleet.table import LoopTable, read_loops
 from pidemu.ranges import SignalRange
@@ -227,3 +229,22 @@ def test_a_table_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     table = read(tmp_path, "A,no/card,,gain=1,,,,,,")
     with pytest.raises(FleetError, match=r"nowhere/out\.csv: cannot be written: No such file or directory"):
         table.write(tmp_path / "nowhere" / "out.csv", None)
+
+
+@pytest.mark.parametrize("error", [RecursionError("too deep"), KeyError("Ti"), OSError(36, "File name too long")])
+def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = pidemu.load_card
+
+    def load_card(name: str, *rest: Any) -> Any:
+        if name == "emerson/deltav":
+            raise error
+        return real(name, *rest)
+
+    monkeypatch.setattr(table, "load_card", load_card)
+    path = tmp_path / "loops.csv"
+    rows = ('A,generic/standard,K=1; Ti=10,"gain=1,lag=9"', 'B,emerson/deltav,GAIN=1,"gain=1,lag=9"')
+    path.write_text("tag,card,settings,process\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    found = table.read_loops(path)
+    assert [loop.tag for loop in found.loops] == ["A"]
+    assert [(row.tag, row.line) for row in found.wrong] == [("B", 3)]
+    assert found.wrong[0].reason.startswith(f"internal error of this loop ({type(error).__name__}: {error})")

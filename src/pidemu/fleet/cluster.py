@@ -72,6 +72,7 @@ class _Chunks:
         self._distributed, self._client, self._plan = distributed, client, plan
         self._loops, self._size = iter(loops), _FIRST
         self._under_way: dict[Any, list[Numbered]] = {}
+        self._halves: list[list[Numbered]] = []
         self._workers = _Workers(client, worker_timeout)
 
     def outcomes(self) -> Iterator[Outcome | Failed]:
@@ -82,12 +83,16 @@ class _Chunks:
                 if future.cancelled():
                     break
                 chunk = self._under_way.pop(future)
-                found, seconds = _result(future, chunk)
-                yield from found
-                self._size = _next_size(self._size, len(chunk), seconds)
+                if len(chunk) > 1 and isinstance(future.exception(), self._distributed.KilledWorker):
+                    middle = len(chunk) // 2  # one of them ends whatever runs it: the others are not to go with it
+                    self._halves += [chunk[:middle], chunk[middle:]]
+                else:
+                    found, seconds = _result(future, chunk)
+                    yield from found
+                    self._size = _next_size(self._size, len(chunk), seconds)
                 if self._client.status == "running":
                     done.update(self._submitted())
-            left = itertools.chain(*self._under_way.values(), self._loops)
+            left = itertools.chain(*self._under_way.values(), *self._halves, self._loops)
             yield from (Failed(place, self._workers.fault or _LOST) for place, _ in left)
         finally:
             if self._client.status == "running":
@@ -97,10 +102,13 @@ class _Chunks:
         """Submit further chunks; workers may have come or gone."""
         threads = max(1, sum(self._client.nthreads().values()))
         new = []
-        while len(self._under_way) < _AHEAD * threads and (chunk := list(itertools.islice(self._loops, self._size))):
+        while len(self._under_way) < _AHEAD * threads and (chunk := self._next()):
             new.append(self._client.submit(run_chunk, chunk, self._plan, pure=False, retries=2))
             self._under_way[new[-1]] = chunk
         return new
+
+    def _next(self) -> list[Numbered]:
+        return self._halves.pop() if self._halves else list(itertools.islice(self._loops, self._size))
 
 
 class _Workers:

@@ -180,11 +180,11 @@ class SignalFolder:
             records.flush()
             with path.open("r+b") as file:
                 os.fsync(file.fileno())
+        self._unfinished.discard(path)  # first: what is listed is never removed, wherever Ctrl-C comes
         text = io.StringIO()
         write_rows(text, ([] if self._index.exists() else [_HEADER]) + [_row(one, (path, i)) for i, one in enumerate(rows)])
         with writing(self._index, _ROOM):
             _append(self._index, text.getvalue().encode(errors="backslashreplace"))
-        self._unfinished.discard(path)
         return path
 
     def close(self, *, finished: bool) -> None:

@@ -14,6 +14,7 @@ from pidemu.files.quoting import quoted
 from pidemu.files.reading import Kind, control, read_text
 from pidemu.files.tables import Lines, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
+from pidemu.fleet.prepare import reason_of
 from pidemu.fleet.result import HEADER, FleetResult
 from pidemu.loop.process import parse_process
 from pidemu.scan.build import Action
@@ -161,8 +162,9 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
                 raise FleetError(f"{len(cells)} cells, the header has {len(header)}; {remedy}")
             loops.append(_loop(row, number, seen, vendors))
             numbers.append(number)
-        except PidemuError as error:
-            wrong.append(WrongRow(number, row.get("tag", ""), row.get("card", ""), _in_one_line(error)))
+        except Exception as error:  # whatever it is: one wrong row among thousands stops no other
+            reason = _in_one_line(error) if isinstance(error, PidemuError) else reason_of(error)
+            wrong.append(WrongRow(number, row.get("tag", ""), row.get("card", ""), reason))
     return LoopTable(str(path), tuple(loops), tuple(numbers), tuple(wrong), lines.skipped)
 
 
