@@ -70,7 +70,7 @@ def test_a_state_that_is_no_longer_finite_is_reported_once_with_its_scan() -> No
 def test_an_output_to_take_over_that_is_larger_than_any_signal_is_refused(signal: str) -> None:
     controller = Controller(usual(pidemu.load_card("emerson/deltav")), 1.0)
     with pytest.raises(ScanError, match=r"larger than any signal, 1e\+30"):
-        controller.scan(50.0, 50.0, signal != "manual", **{signal: 1e300})
+        controller.scan(50.0, 50.0, signal != "manual", **{signal: 1e300})  # type: ignore[arg-type]
     with pytest.raises(ScanError, match=r"is infinite or larger than any signal in sample 1 \(counted from 0\)"):
         controller.run(50.0, 50.0, signal != "manual", **{signal: [50.0, 1e300]})
 
