@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Final, Literal
 
 from pidemu.card.base import Rule
 from pidemu.errors import ScanError
@@ -115,6 +115,10 @@ class Gate:
     clamped: bool = False
 
 
+LONGEST_DELAY: Final = 1000
+"""Scans of dead time beyond which the program of a pole cancellation would be absurdly long."""
+
+
 @dataclass(frozen=True, slots=True)
 class Dahlin:
     """A pole-cancellation algorithm's process and wish (specs/equations.md, section 4).
@@ -135,9 +139,22 @@ class Dahlin:
     wanted: float
 
     def numbers(self, h: float) -> tuple[float, float, float, int]:
-        """Return ``g, p, q, N`` of ``u_n = q u_(n-1) + (1-q) u_(n-N-1) + g (e_n - p e_(n-1))`` at a scan interval `h` [s]."""
+        """Return ``g, p, q, N`` of ``u_n = q u_(n-1) + (1-q) u_(n-N-1) + g (e_n - p e_(n-1))`` at a scan interval `h` [s].
+
+        Raises
+        ------
+        ScanError
+            The dead time is too many scans, or a time so long that floating point cannot tell a scan of it.
+        """
+        if self.delay / h > LONGEST_DELAY + 0.5:
+            scans = f"{self.delay / h:.0f} scans of {h:g} s"
+            raise ScanError(f"the dead time is {scans}, the most is {LONGEST_DELAY}; use a longer scan interval")
         q = math.exp(-h / self.wanted) if self.wanted else 0.0
         p = math.exp(-h / self.time) if self.time else 0.0
+        if p == 1 or q == 1:
+            raise ScanError(
+                f"a time of {max(self.time, self.wanted):g} s is too long for a scan interval of {h:g} s; use a longer one"
+            )
         return (1 - q) / (self.gain * (1 - p)), p, q, round(self.delay / h)
 
 

@@ -36,6 +36,14 @@ def _pair(limits: Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
+def _number(name: str, given: object) -> float:
+    """Return a signal, which may be NaN or infinite."""
+    try:
+        return number(given)
+    except ValueError as error:
+        raise ScanError(f"{name}: {error}") from None
+
+
 class Controller:
     """The controller of a card, with settings, running at a scan interval.
 
@@ -202,7 +210,7 @@ class Controller:
         for name, value in states.items():
             if name not in names:
                 raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
-            if not isfinite(value):
+            if not isfinite(_number(f"the state {name}", value)):
                 raise ScanError(f"the state {name} = {value} is not a finite number")
         running = {name: 1.0 for name in ("on", "begun") if "I" in states and name in names}
         for name, value in (running | states).items():
@@ -225,6 +233,7 @@ class Controller:
         """
         if self._count:
             raise ScanError(f"a controller starts at rest before the first scan, and there have been {self._count}; reset() first")
+        sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
         last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
@@ -360,9 +369,10 @@ class Controller:
             self._count += 1
             return self._scan(self._state, sp, pv, 1.0, nan)
         signals = (cascade, track, external_reset, feedforward)
-        given = {name: float(x) for name, x in zip(SIGNALS, signals, strict=True) if x is not None}
-        by_hand = nan if manual is None else float(manual)
-        return self._any_scan(float(sp), float(pv), auto, by_hand, given, hold, None if interval is None else float(interval))
+        given = {name: _number(name, x) for name, x in zip(SIGNALS, signals, strict=True) if x is not None}
+        by_hand = nan if manual is None else _number("manual", manual)
+        since = None if interval is None else _number("interval", interval)
+        return self._any_scan(_number("sp", sp), _number("pv", pv), auto, by_hand, given, hold, since)
 
     def _any_scan(
         self, sp: float, pv: float, auto: bool, by_hand: float, given: Mapping[str, float], hold: bool, interval: float | None

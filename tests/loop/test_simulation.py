@@ -16,7 +16,7 @@ import pidemu
 from pidemu.certificate.figures import loop_rows
 from pidemu.engines import Choice
 from pidemu.errors import ProcessError, UndefinedError
-from pidemu.loop.figures import loop_figures, scan_for
+from pidemu.loop.figures import crossover, loop_figures, scan_for
 from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
 from pidemu.loop.process import Process
@@ -318,3 +318,23 @@ def test_the_iae_at_a_very_short_scan_interval_costs_no_more_than_at_a_longer_on
     settings = pidemu.load_card("generic/standard").settings(K=1, Ti=1000)
     assert load_iae(settings, Process.from_lags(1, [1000], delay=100), h) == pytest.approx(1000, rel=1e-6)
     assert len(moved) <= 100_000
+
+
+DEGENERATE = [
+    Process(1, [0]), Process(1, [0, 0]), Process(1, [-1, -1]), Process(1, [-1], [-1]), Process(1, [0], [0]), Process(1, [-1], [0]),
+    Process(1), Process(-1, delay=1), Process(1, [1], [1]), Process(1, [1j, -1j], [1j, -1j]), Process(1, [-1], [1], 1),
+    Process(1, [math.pi * 1j, -math.pi * 1j]), Process(1, [0, 0, 0, 0]), Process(1, [-math.log(2)]), Process(1, [1, 1]),
+]  # fmt: skip
+"""Poles at 0, 1 and -1 of the sampled loop, double ones, and ones that a zero cancels."""
+
+
+@pytest.mark.parametrize("dials", [{}, {"kp": 1}, {"kp": 2}, {"ki": 1}, {"kd": 1}, {"kp": 1, "ki": 1, "kd": 1}], ids=str)
+@pytest.mark.parametrize("process", DEGENERATE, ids=str)
+def test_a_loop_whose_polynomials_lose_a_term_has_figures(process: Process, dials: dict[str, float]) -> None:
+    settings = parallel(**dials)
+    for h in (1.0, 2.0):
+        found = compare_loops(settings, settings, process, (h, h))
+        assert repr(found.source) == repr(found.target)
+        assert found.source.iae > 0 or math.isnan(found.source.iae)
+        assert found.source.stable or found.source.iae == math.inf or not any(dials.values())
+    assert crossover(settings.law().response, process, 1.0) is None or dials

@@ -27,6 +27,7 @@ from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.files.writing import beside, check
 from pidemu.plain import json_safe
+from pidemu.plausible import number_in
 from pidemu.record.files import Floats, Record, read_record, write_record
 from pidemu.record.playback import Playback, Timing, far_out, play, timing
 from pidemu.scan.build import Action
@@ -154,7 +155,7 @@ def _start(controller: Controller, words: tuple[str, ...], has_output: bool) -> 
 
 def _number(name: str, text: str) -> float:
     try:
-        value = float(text)
+        value = number_in(text)
     except ValueError:
         raise SettingError(f"--initial {name}: '{text}' is not a number") from None
     if not np.isfinite(value):

@@ -116,7 +116,9 @@ def crossover(controller: Callable[[Floats], Response], process: Process, scan: 
     """
 
     def decibel(w: Floats) -> Floats:
-        return np.log(np.abs(controller(w) * process.response(w)))
+        with np.errstate(divide="ignore", invalid="ignore"):  # no response, or that of an undamped pole
+            found = np.log(np.abs(controller(w) * process.response(w)))
+        return np.where(np.isnan(found), -np.inf, found)
 
     corners = [abs(r) for r in (*process.poles, *process.zeros) if r] or [1 / process.delay if process.delay else 1.0]
     low, high = min(corners) * 1e-5, max(corners) * 1e5 if scan is None else math.pi / scan

@@ -130,7 +130,8 @@ def _iae(law: Law, process: Process, factor: float, stable: bool, most: int) -> 
     scans = _scans_of_a_block(law, process, factor)
     if _FEWEST * scans > most:
         return math.nan
-    shares = _shares(a, h, replace(process, gain=process.gain * OpenLoop(law, process, factor).gain), scans)
+    gain = OpenLoop(law, process, factor).gain or abs(factor)  # a controller that does nothing does so with any gain
+    shares = _shares(a, h, replace(process, gain=process.gain * gain), scans)
     return _summed(shares, most // scans) / abs(factor)
 
 

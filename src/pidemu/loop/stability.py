@@ -83,6 +83,8 @@ def unstable_sampled(values: Response, poles: int, integrators: int) -> bool:
         Poles at ``z = 1``.
     """
     f = 1 + values
+    if not f.all():
+        return True  # a pole on the unit circle
     turned = float(np.sum(np.angle(f[1:] / f[:-1])))
     if abs(values[-1]) < 1:
         turned -= float(np.angle(f[-1]))  # on to the real axis

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pidemu.algorithm import Algorithm
-from pidemu.errors import ScanError
 from pidemu.scan import output
 from pidemu.scan.blocks import Builder
 from pidemu.scan.program import select
 from pidemu.scan.terms import Terms
-
-_LONGEST = 1000
-"""Scans of dead time beyond which the program would be absurdly long."""
 
 
 def dahlin(b: Builder, a: Algorithm, h: float, sign: float, t: Terms) -> None:
@@ -21,12 +17,10 @@ def dahlin(b: Builder, a: Algorithm, h: float, sign: float, t: Terms) -> None:
     Raises
     ------
     ScanError
-        The dead time is more than a thousand scans.
+        The dead time is more than a thousand scans, or a time is too long for the interval.
     """
     assert a.dahlin is not None
     g, p, q, delay = a.dahlin.numbers(h)
-    if delay > _LONGEST:
-        raise ScanError(f"the dead time is {delay} scans of {h:g} s, the most is {_LONGEST}; use a longer scan interval")
     manual = output.by_hand(b, a, t.u)
     last = output.kept(b, a, t.u)
     past = [b.state(f"u{n}", f"output {n + 1} scans ago") for n in range(1, delay + 1)]
