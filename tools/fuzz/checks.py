@@ -12,8 +12,8 @@ from tools.fuzz.failures import Breach
 
 _FLOOD: Final = 100_000
 """Characters on stderr that are too many, whatever was wrong."""
-_STYLE: Final = re.compile(r"\x1b\[[01]m")
-"""What a terminal is told by ourselves: bold, and the end of it."""
+_STYLE: Final = re.compile(r"\x1b\[(0|1|32|33|36)m")
+"""What a terminal is told by ourselves: bold, green, yellow, cyan, and the end of it."""
 _UNWANTED: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a terminal obeys, and what turns the order of its letters."""
 _LINES: Final = re.compile("[\u2028\u2029]")

@@ -100,6 +100,6 @@ def rows_in(content: bytes, is_empty: str) -> set[int]:
 
 def _count(lines: Sequence[str], is_empty: str) -> int:
     held = [line for line in lines if line.strip(is_empty)]
-    while held and (held[0].lstrip().startswith("# ") or held[0].strip() == "#"):
+    while held and (held[0].startswith("# ") or held[0].rstrip() == "#"):
         del held[0]
     return max(0, len(held) - 1)

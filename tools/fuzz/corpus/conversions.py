@@ -24,8 +24,11 @@ def corpus() -> dict[str, Case]:
         "smallest-scan": ("K=1", "Ti=10", *_TO, "--scan", "5e-324"),
         "huge-scan": ("K=1", "Ti=10", *_TO, "--scan", "1e300"),
     }
+    lines["action-against-default-gains"] = ("--to", "generic/standard", "--action", "direct")
     both = ((name, words, direct) for name, words in lines.items() for direct in (False, True))
     return {
-        f"{name}{'-from-python' if direct else ''}": Case(("convert", "generic/standard", *words), direct=direct)
+        f"{name}{'-from-python' if direct else ''}": Case(
+            ("convert", "simple-pid/simple-pid" if "default-gains" in name else "generic/standard", *words), direct=direct
+        )
         for name, words, direct in both
     }

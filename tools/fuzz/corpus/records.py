@@ -35,6 +35,7 @@ def corpus() -> dict[str, Case]:
         "utf-16-big-endian": usual.encode("utf-16-be"),
         "utf-16-with-mark": usual.encode("utf-16"),
         "one-measurement-of-1e300": "sp,pv\n" + "50,50\n" * 5 + "50,1e300\n" + "50,50\n" * 20,
+        "recorded-output-beyond-all": f"sp,pv,output\n1,50,1e200\n{_ROWS}",
         "hostile-spreadsheet": f"sp,pv,note\n1,50,=cmd|'/c calc'!A0\n{_ROWS}",
     }
     found = {name: _case(content) for name, content in damaged.items()}

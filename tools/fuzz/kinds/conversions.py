@@ -69,7 +69,7 @@ def run(case: Case) -> int:
     target = arguments.pop("to")
     conversion = pidemu.convert(source, target, **arguments)
     json.dumps(conversion.to_dict(), default=str)
-    print(conversion)
+    print(conversion.sentence)
     return 0
 
 
