@@ -14,8 +14,11 @@ from numbers import Real
 from typing import Any, Final
 
 from pidemu.errors import PidemuError
+from pidemu.excerpt import quoted
 
-_NUMBER: Final = re.compile(r"\s*[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf(?:inity)?|nan)\s*", re.I | re.A)
+_PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_WITH_COMMA: Final = re.compile(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?")
+_WORDS: Final = re.compile(r"nan|[+-]?inf(?:inity)?", re.IGNORECASE)
 _LONGEST: Final = 40
 """Characters of what was given that a message repeats."""
 
@@ -88,22 +91,47 @@ def number(given: object) -> float:
     return found
 
 
-def number_in(text: str) -> float:
-    """Return a number that was written: digits with a decimal point, ``inf`` or ``nan``.
+def plain_number(text: str, *, words: bool = False) -> float:
+    """Read a number in plain decimal notation, such as ``-1.5`` or ``2e-3``.
+
+    Parameters
+    ----------
+    text : str
+        The number; blanks around it do not count.
+    words : bool
+        Whether ``nan``, ``inf`` and ``-inf`` are numbers, too.
 
     Raises
     ------
     ValueError
-        It is none, or too large or too small to compute with; the message says so.
+        It is none, or larger or smaller than any number a computer has; the message quotes it, with the remedy.
+
+    Examples
+    --------
+    >>> plain_number("-1.5e3")
+    -1500.0
+    >>> plain_number("1_0")
+    Traceback (most recent call last):
+        ...
+    ValueError: '1_0' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3
     """
-    if not _NUMBER.fullmatch(text):
-        raise ValueError(f"'{cut(text)}' is not a number")
-    found = float(text)
-    if math.isinf(found) and "inf" not in text.casefold():
-        raise ValueError(f"'{cut(text)}' is too large a number")
-    if not found and any(digit in "123456789" for digit in text.casefold().partition("e")[0]):
-        raise ValueError(f"'{cut(text)}' is too small a number")
-    return found
+    text = text.strip(" \t")
+    if _PLAIN.fullmatch(text):
+        value = float(text)
+        if math.isinf(value):
+            raise ValueError(f"'{quoted(text)}' is too large a number")
+        if not value and re.search("[1-9]", text.casefold().partition("e")[0]):
+            raise ValueError(f"'{quoted(text)}' is too small a number")
+        return value
+    if words and _WORDS.fullmatch(text):
+        return float(text)
+    if _WITH_COMMA.fullmatch(text):
+        raise ValueError(f"'{quoted(text)}' has a comma; write a decimal point")
+    try:
+        float(text)
+    except ValueError:
+        raise ValueError(f"'{quoted(text)}' is not a number") from None
+    raise ValueError(f"'{quoted(text)}' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3")
 
 
 def plausible(name: str, given: Any, quantity: Quantity, error: type[PidemuError]) -> float:
@@ -137,11 +165,6 @@ def shown(given: object) -> str:
     if isinstance(given, int) and given.bit_length() > 4 * _LONGEST:
         return f"a whole number of {int(given.bit_length() * math.log10(2)) + 1:,} digits"
     try:
-        return cut(repr(given))
+        return quoted(repr(given), _LONGEST)
     except Exception:  # a stranger's class, or a fraction of numbers too long to print
         return f"a {type(given).__name__}"
-
-
-def cut(text: str) -> str:
-    """Return a text, or its beginning where it is long."""
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from pidemu.errors import SettingError
+from pidemu.excerpt import quoted
 from pidemu.plain import exactly
-from pidemu.plausible import ENDS, SPAN, cut, number, number_in, shown
+from pidemu.plausible import ENDS, SPAN, number, plain_number, shown
 
 Which = Literal["pv_range", "op_range"]
 
@@ -111,9 +112,11 @@ def read_range(given: object) -> SignalRange:
 def _from_text(text: str) -> SignalRange:
     parts = [_ENDS.fullmatch(part) for part in text.split("=")]
     if None in parts or len(parts) > 2:
-        raise SettingError(f"'{cut(text)}' is not a range; write {_SUCH}")
+        raise SettingError(f"'{quoted(text)}' is not a range; write {_SUCH}")
     try:
-        own, *meaning = (SignalRange(number_in(m[1]), number_in(m[2]), m[3]) for m in parts if m is not None)
+        own, *meaning = (
+            SignalRange(plain_number(m[1], words=True), plain_number(m[2], words=True), m[3]) for m in parts if m is not None
+        )
     except ValueError as error:
         raise SettingError(f"{error}; write {_SUCH}") from None
     return replace(own, meaning=meaning[0]) if meaning else own

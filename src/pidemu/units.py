@@ -33,7 +33,8 @@ from functools import cache
 from typing import Any, Final
 
 from pidemu.errors import UnitError, suggest
-from pidemu.plausible import cut, number_in
+from pidemu.excerpt import quoted
+from pidemu.plausible import plain_number
 
 
 class Dimension(StrEnum):
@@ -262,12 +263,12 @@ def parse_quantity(text: str) -> tuple[float, Unit | None]:
     """
     match = _NUMBER.match(text)
     if match is None:
-        raise UnitError(f"'{cut(text)}' is not a number, nor a number with a unit such as \"20 s/repeat\"")
+        raise UnitError(f"'{quoted(text)}' is not a number, nor a number with a unit such as \"20 s/repeat\"")
     number, unit = match.groups()
     if unit.startswith(","):
-        raise UnitError(f"'{cut(text)}' has a comma; write a decimal point")
+        raise UnitError(f"'{quoted(text)}' has a comma; write a decimal point")
     try:
-        return number_in(number), parse_unit(unit) if unit else None
+        return plain_number(number, words=True), parse_unit(unit) if unit else None
     except ValueError as error:
         raise UnitError(str(error)) from None
 

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from pidemu.errors import SettingError, UnitError
-from pidemu.plausible import cut, number_in
+from pidemu.excerpt import quoted
+from pidemu.plausible import plain_number
 from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
@@ -44,11 +45,11 @@ def pair(text: str) -> tuple[float, float]:
         They are not two numbers, or the first is not the lower one.
     """
     try:
-        low, high = (number_in(x) for x in text.split(","))
+        low, high = (plain_number(x, words=True) for x in text.split(","))
     except ValueError:
-        raise SettingError(f"'{cut(text)}' is not two numbers such as 0,200") from None
+        raise SettingError(f"'{quoted(text)}' is not two numbers such as 0,200") from None
     if not low < high:  # not a number compares false as well
-        raise SettingError(f"'{cut(text)}' is not low and high; write the lower number first, such as 0,100")
+        raise SettingError(f"'{quoted(text)}' is not low and high; write the lower number first, such as 0,100")
     return low, high
 
 
@@ -64,7 +65,7 @@ def seconds(text: str) -> float:
         number, unit = parse_quantity(text.strip())
         return number if unit is None else to_canonical(Role.PROCESS_TIME, number, unit)
     except UnitError:
-        raise SettingError(f"'{cut(text)}' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
+        raise SettingError(f"'{quoted(text)}' is not a time; write seconds, such as 0.5, or a unit too, such as 10 min") from None
 
 
 def step(text: str) -> float | tuple[float, float]:
@@ -77,11 +78,11 @@ def step(text: str) -> float | tuple[float, float]:
     """
     when, comma, size = text.rpartition(",")
     try:
-        found = (seconds(when), number_in(size)) if comma else (0.0, number_in(text))
+        found = (seconds(when), plain_number(size, words=True)) if comma else (0.0, plain_number(text, words=True))
         if not all(map(math.isfinite, found)):
             raise ValueError
     except (ValueError, SettingError):
         raise SettingError(
-            f"'{cut(text)}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
+            f"'{quoted(text)}' is not a step; write its size in %, such as 5, or its time and size, such as 60,5"
         ) from None
     return found if comma else found[1]

@@ -11,7 +11,7 @@ import click
 
 from pidemu.cli import interrupts, streams
 from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError, suggest
-from pidemu.files.quoting import printable
+from pidemu.excerpt import printable
 
 _COMMANDS: Final = {
     "cards": "List the cards, and how sure they are.",

@@ -17,8 +17,7 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.engines import ENGINES, Engine
 from pidemu.errors import SettingError
-from pidemu.excerpt import visible
-from pidemu.files.quoting import printable, printable_json
+from pidemu.excerpt import printable, printable_json, visible
 from pidemu.plain import json_safe
 from pidemu.ranges import SignalRange, read_range
 from pidemu.words import assignments as assignments  # noqa: PLC0414

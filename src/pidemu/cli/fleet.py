@@ -26,7 +26,7 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.errors import FleetError
-from pidemu.files.quoting import quoted
+from pidemu.excerpt import quoted
 from pidemu.files.writing import check
 from pidemu.fleet.fleet import Fleet
 from pidemu.fleet.judgement import MARGINS, RAN

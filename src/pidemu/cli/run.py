@@ -27,7 +27,7 @@ from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.files.writing import beside, check
 from pidemu.plain import json_safe
-from pidemu.plausible import number_in
+from pidemu.plausible import plain_number
 from pidemu.record.files import Floats, Record, read_record, write_record
 from pidemu.record.playback import Playback, Timing, far_out, play, timing
 from pidemu.scan.build import Action
@@ -155,7 +155,7 @@ def _start(controller: Controller, words: tuple[str, ...], has_output: bool) -> 
 
 def _number(name: str, text: str) -> float:
     try:
-        value = number_in(text)
+        value = plain_number(text.strip(), words=True)
     except ValueError:
         raise SettingError(f"--initial {name}: '{text}' is not a number") from None
     if not np.isfinite(value):

@@ -14,8 +14,7 @@ import pidemu
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.schema import ConversionPart
 from pidemu.errors import CertificateError
-from pidemu.excerpt import visible
-from pidemu.files.quoting import quoted
+from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, read_text
 
 LARGEST: Final = 16 * 2**20

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from pidemu.errors import PidemuError
-from pidemu.files.numbers import plain_number
 from pidemu.files.writing import beside
+from pidemu.plausible import plain_number
 
 _FORMULA: Final = re.compile("'*[=+\\-@\t\r\uff1d\uff0b\uff0d\uff20]")
 """A cell that a spreadsheet may compute; behind apostrophes it is text."""

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 from pidemu.card.library import folders, load_card
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
-from pidemu.excerpt import visible
-from pidemu.files.quoting import quoted
+from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
 from pidemu.files.tables import Lines, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop

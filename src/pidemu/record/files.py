@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.errors import RecordError, suggest
-from pidemu.excerpt import visible
-from pidemu.files.numbers import plain_number
-from pidemu.files.quoting import quoted
+from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, read_text
 from pidemu.files.tables import split_lines, split_row, write_rows
+from pidemu.plausible import plain_number
 
 Floats = npt.NDArray[np.float64]
 

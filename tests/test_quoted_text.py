@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from pidemu.files.quoting import printable, printable_json, quoted
+from pidemu.excerpt import printable, printable_json, quoted
 
 
 @pytest.mark.parametrize("text", ["FIC-1", "Kühler ℃ 温度 עברית 😀\nsecond line", ""])

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from pidemu.files.numbers import plain_number
+from pidemu.plausible import plain_number
 
 _ONLY = "is not a number; write digits and a decimal point only, such as 10 or 1.5e-3"
 
