@@ -74,6 +74,19 @@ def test_the_bias_is_the_output_of_a_controller_without_integral(folder: Path) -
     assert emulated(result.out) == [30, 32, 31, 29.5]
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("outputs", "said_of_them"),
+    [(("", "1"), "0 in sample 1 (counted from 0): emulated 1, recorded 1"), (("1", "1e200"), "1e+200 in sample 1")],
+)
+def test_the_largest_difference_is_of_a_sample_with_a_recorded_output(
+    folder: Path, outputs: tuple[str, str], said_of_them: str
+) -> None:
+    text = "sp,pv,auto,out\n50,50,0,{}\n50,50,1,{}\n".format(*outputs)
+    _, _, err = recorded(folder, text, "--initial-output", "1")
+    assert f"largest difference from the recorded output: {said_of_them}" in err
+
+
 def test_a_recorded_output_is_where_the_emulation_starts_and_what_it_is_compared_with(folder: Path) -> None:
     text = "sp,pv,OP\n50,50,40\n51,50,42.2\n51,50.5,41.3\n51,51.25,39\n"
     _, out, err = recorded(folder, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -233,10 +234,13 @@ def _worst(recorded: Floats, emulated: Floats) -> tuple[float, int, float] | Non
     known = np.isfinite(recorded)
     if not known.any():
         return None
-    difference = np.where(known, np.abs(emulated - recorded), 0.0)
+    difference = np.where(known, np.abs(emulated - recorded), -np.inf)
     difference[known & ~np.isfinite(emulated)] = np.inf  # no number where one was recorded
     at = int(np.argmax(difference))
-    return float(difference[at]), at, float(np.sqrt(np.mean(difference[known] ** 2)))
+    largest = float(difference[at])
+    if not largest or math.isinf(largest):
+        return largest, at, largest
+    return largest, at, largest * float(np.sqrt(np.mean((difference[known] / largest) ** 2)))  # squares may overflow
 
 
 def _difference(record: Record, emulated: Floats) -> str:
