@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -237,10 +236,7 @@ def _worst(recorded: Floats, emulated: Floats) -> tuple[float, int, float] | Non
     difference = np.where(known, np.abs(emulated - recorded), -np.inf)
     difference[known & ~np.isfinite(emulated)] = np.inf  # no number where one was recorded
     at = int(np.argmax(difference))
-    largest = float(difference[at])
-    if not largest or math.isinf(largest):
-        return largest, at, largest
-    return largest, at, largest * float(np.sqrt(np.mean((difference[known] / largest) ** 2)))  # squares may overflow
+    return float(difference[at]), at, float(np.sqrt(np.mean(difference[known] ** 2)))
 
 
 def _difference(record: Record, emulated: Floats) -> str:
