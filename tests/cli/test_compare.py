@@ -199,7 +199,6 @@ def test_wrong_usage_is_said_with_the_usage_and_status_2(line: str, message: str
         ((*A, *B, "--record", "none.csv"), "none.csv: cannot be read: No such file or directory"),
         ((*A, *B, "-o", "nowhere/x.csv"), "nowhere/x.csv: cannot be written: No such file or directory"),
         ((*A, *B, "--plot", "x.pdf"), "x.pdf: pictures are written as .png or .svg; give the file such an ending"),
-        ((*A, *B, "--limits", "9,1"), "output limits 9 to 1 are not a range; give low, then high"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_message_with_status_2(words: tuple[str, ...], message: str) -> None:

@@ -449,7 +449,7 @@ PROCESSES = {
     "gain=1,lag=3 %": "lag=3 %: '%' is a percentage and cannot set process time; use one of: s, min",
     "gain=1,delay=-3": "the dead time -3 s is negative; give the time that the process waits, or 0",
     "gain=1,pole=fast": "pole=fast is not a number [rad/s] such as -0.1 or -0.1+0.2j",
-    "gain=1,integrators=1.5": "integrators is 1.5; give how many there are: 0, 1 or 2",
+    "gain=1,integrators=1.5": "integrators is '1.5'; give how many there are: 0 to 4, and usually 0 or 1",
 }
 """A cause and a remedy for every wrong process."""
 
