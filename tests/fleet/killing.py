@@ -1,14 +1,15 @@
 """Kill fleets at random moments, and see what is left: ``python -m tests.fleet.killing [RUNS] [SEED]``.
 
 Each run is a command of its own that writes signals, a Parquet file and a table, killed (SIGKILL, SIGTERM or SIGINT) after a random
-time. What is there afterwards must be readable and complete as far as it goes, and the command with ``--resume`` must end, with
-the very numbers of a run that nobody disturbed.
+time, most often while it writes. What is there afterwards must be readable and complete as far as it goes, and the command with
+``--resume`` must end, with the very numbers of a run that nobody disturbed.
 """
 
 from __future__ import annotations
 
 import csv
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,7 +26,7 @@ from pidemu.fleet.folder import INDEX
 KILLS: Final = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 COUNT: Final = 130
 _HEAD: Final = "tag,card,settings,process,scan,time\n"
-_WORDS: Final = ("--signals", "signals", "--parquet", "fleet.parquet", "--table", "table.csv", "--cores", "2")
+_WORDS: Final = ("--signals", "signals", "--parquet", "fleet.parquet", "--table", "table.csv", "--cores", "2", "--no-margins")
 _ELSEWHERE: Final = ("engine",)
 """Columns that are not the loop's but those of whatever ran it."""
 
@@ -37,12 +38,14 @@ def write_loops(path: Path, count: int = COUNT) -> None:
         card, settings = (("generic/standard", f"K={1 + i % 7 / 10}; Ti={10 + i % 11}"), ("fisher/provox", "GAIN=1; RESET=2"))[
             i % 2
         ]
-        rows.append(f'L{i},{card},{settings},"gain=1,lag={5 + i % 9},delay={2 + i % 3}",0.5,{300 + 40 * (i % 13)}\n')
+        rows.append(f'L{i},{card},{settings},"gain=1,lag={5 + i % 9},delay={2 + i % 3}",0.5,{5000 + 500 * (i % 13)}\n')
     path.write_text(_HEAD + "".join(rows), encoding="utf-8")
 
 
 def start(folder: Path, *more: str) -> subprocess.Popen[str]:
     """Start the command in a folder with ``loops.csv``."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background of a shell; it would ignore it, too
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     words = [sys.executable, "-m", "pidemu", "fleet", "loops.csv", "--engine", "python", *_WORDS, *more]
     return subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
@@ -79,6 +82,7 @@ class Whole:
 
     table: dict[str, dict[str, str]]
     signals: dict[str, bytes]
+    first: float
     seconds: float
 
     @classmethod
@@ -87,12 +91,19 @@ class Whole:
         write_loops(folder / "loops.csv")
         begun = time.monotonic()
         process = start(folder)
+        while not (folder / "signals" / INDEX).exists() and process.poll() is None:
+            time.sleep(0.01)
+        first = time.monotonic() - begun
         out, err = process.communicate(timeout=300)
         assert (process.returncode, err) == (0, ""), (out, err)
-        found = cls(table_of(folder / "table.csv"), signals_of(folder / "signals"), time.monotonic() - begun)
+        found = cls(table_of(folder / "table.csv"), signals_of(folder / "signals"), first, time.monotonic() - begun)
         assert parquet_of(folder / "fleet.parquet") == found.signals
         assert len(found.table) == len(found.signals) == COUNT
         return found
+
+    def moment(self, share: float) -> float:
+        """Return when a share of the time is over in which blocks are written [s]."""
+        return self.first + share * (self.seconds - self.first)
 
 
 def kill_and_resume(folder: Path, whole: Whole, number: int, after: float) -> int:
@@ -160,7 +171,8 @@ def kill_many(folder: Path, runs: int, seed: int) -> list[int]:
     found = []
     for i in range(runs):
         number = KILLS[i % len(KILLS)]
-        found.append(kill_and_resume(folder / str(i), whole, number, chance.uniform(0, 1.05 * whole.seconds)))
+        found.append(kill_and_resume(folder / str(i), whole, number, whole.moment(chance.uniform(-0.2, 1.1))))
+        shutil.rmtree(folder / str(i))
     return found
 
 

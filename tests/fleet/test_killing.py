@@ -17,8 +17,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     return Whole.run(tmp_path_factory.mktemp("whole"))
 
 
-@pytest.mark.parametrize(("number", "share"), list(zip(KILLS, (0.6, 0.7, 0.8), strict=True)))
+@pytest.mark.parametrize(("number", "share"), list(zip(KILLS, (0.3, 0.5, 0.7), strict=True)))
 def test_a_fleet_that_is_killed_leaves_complete_rows_and_goes_on_to_the_same_numbers(
     number: int, share: float, whole: Whole, tmp_path: Path
 ) -> None:
-    kill_and_resume(tmp_path / "killed", whole, number, share * whole.seconds)
+    kill_and_resume(tmp_path / "killed", whole, number, whole.moment(share))
