@@ -28,7 +28,7 @@ from pidemu.settings import Settings
 CARDS = list(card_files())
 EXAMPLES = int(os.environ.get("PIDEMU_EXAMPLES", "25"))
 EDGES = [
-    0, 1, -1, 1e-15, 1e15, 1e-12, 1e12, 1e-9, 1e9, 1e-6, 1e6, 1e-3, 1e3, 0.5, 2, 5e-324, 1e-308, 1e308, 1e38, 10**5000,
+    0, 1, -1, 1e-30, 1e-15, 1e15, 1e-12, 1e12, 1e-9, 1e9, 1e-6, 1e6, 1e-3, 1e3, 0.5, 2, 5e-324, 1e-308, 1e308, 1e38, 10**5000,
     math.nan, math.inf, -math.inf,
 ]  # fmt: skip
 PROCESSES = [

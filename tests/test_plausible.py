@@ -65,11 +65,11 @@ def test_a_number_out_of_range_names_setting_range_and_remedy() -> None:
     with pytest.raises(SettingError) as caught:
         pidemu.load_card("fisher/provox").settings(GAIN=1e-308, RESET=4)
     assert str(caught.value) == (
-        "fisher/provox: GAIN: 1e-308 %/% is not a gain that a loop has, 1e-12 to 1e+12 %/% in size; check the number and its unit"
+        "fisher/provox: GAIN: 1e-308 %/% is not a gain that a loop has, 1e-30 to 1e+12 %/% in size; check the number and its unit"
     )
     with pytest.raises(ScanError, match="scan interval: 1e-10 s is not an interval at which a controller is executed, 1e-09 to 1e"):
         plausible("scan interval", 1e-10, INTERVAL, ScanError)
-    assert [GAIN.has(x) for x in (0.0, 1e-12, -1e12, 1e-13, 1e13)] == [True, True, True, False, False]
+    assert [GAIN.has(x) for x in (0.0, 1e-30, -1e12, 1e-31, 1e13)] == [True, True, True, False, False]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Numbers as they enter: read once, and held against what a control loop can have.
 
 A gain of 1e-308, a time of 1e300 s or a whole number of 5,000 digits is a slip, and what is computed from it leaves the range of
-floating point. The ranges leave several powers of ten beyond what is known of any plant; within them everything can be computed.
+floating point. The ranges leave several powers of ten beyond what is known of any plant, and below what rounding leaves of a dial
+that should be 0; within them everything can be computed.
 """
 
 from __future__ import annotations
@@ -52,11 +53,12 @@ class Quantity:
         return f"{words} is not {self.what}, {self.smallest:g} to {self.largest:g}{unit} in size; check the number and its unit"
 
 
-GAIN: Final = Quantity("a gain that a loop has", "%/%", 1e-12, 1e12)
-TIME: Final = Quantity("a time that a loop has", "s", 1e-15, 1e15)
-RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-20, 1e20)
+GAIN: Final = Quantity("a gain that a loop has", "%/%", 1e-30, 1e12)
+TIME: Final = Quantity("a time that a loop has", "s", 1e-30, 1e15)
+RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-30, 1e20)
 LEVEL: Final = Quantity("a signal or a rate that a loop has", "%", 0.0, 1e40)
-RATIO: Final = Quantity("a ratio that a controller has", "", 1e-15, 1e15)
+RATIO: Final = Quantity("a ratio that a filter has", "", 1e-15, 1e15)
+WEIGHT: Final = Quantity("a weight that a controller has", "", 0.0, 1e15)
 ENDS: Final = Quantity("the end of a signal's range", "", 0.0, 1e15)
 SPAN: Final = Quantity("the width of a signal's range", "", 1e-12, 1e15)
 INTERVAL: Final = Quantity("an interval at which a controller is executed", "s", 1e-9, 1e9)

@@ -12,7 +12,7 @@ from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.models import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, Quantity, number, shown
+from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, Quantity, number, shown
 from pidemu.ranges import RANGES, SignalRange, read_range
 from pidemu.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import (
@@ -32,13 +32,14 @@ from pidemu.units import (
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
 _QUANTITIES: Final[dict[Role, Quantity]] = {
-    **dict.fromkeys((Role.GAIN, Role.MULTIPLIER, Role.PROCESS_GAIN, Role.FEEDFORWARD_GAIN), GAIN),
+    **dict.fromkeys((Role.GAIN, Role.MULTIPLIER, Role.PROCESS_GAIN), GAIN),
     **dict.fromkeys((Role.DERIVATIVE, Role.FILTER_TIME, Role.TRACKING_TIME), TIME),
     **dict.fromkeys((Role.PROCESS_TIME, Role.PROCESS_DELAY, Role.CLOSED_LOOP_TIME), TIME),
     Role.INTEGRAL: RATE,
+    **dict.fromkeys((Role.FILTER_RATIO, Role.FILTER_GAIN, Role.FILTER_FACTOR), RATIO),
     **dict.fromkeys((*LEVELS, *RATES), LEVEL),
 }
-"""What a dial's canonical value is; a ratio where nothing is stated."""
+"""What a dial's canonical value is; a weight where nothing is stated."""
 _PER_REPEAT: Final = (Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
 
 
@@ -250,7 +251,7 @@ def _check(value: Value, written: object) -> None:
 
 def _check_size(value: Value, words: str) -> None:
     """Refuse a dial whose canonical value no controller has; what computes with it could not hold it."""
-    canonical, quantity = value.canonical, _QUANTITIES.get(value.role, RATIO)
+    canonical, quantity = value.canonical, _QUANTITIES.get(value.role, WEIGHT)
     if value.off or not value.value or math.isinf(value.value):
         return
     if not canonical or not quantity.has(canonical):

@@ -70,11 +70,12 @@ def load_iae(settings: Settings, process: Process, scan: float | None = None, fa
         A filter is unstable at the scan interval.
     """
     law = settings.law(scan_for(settings, process) if scan is None else scan)
-    stable = loop_figures(law, process, factor).stable
+    if not loop_figures(law, process, factor).stable:
+        return math.inf
     short = law.scan is not None and law.scan < _short_interval(law, process, factor) / 2
-    if stable and short and law.algorithm.dahlin is None and _FEW * _scans_of_a_block(law, process, factor) > _most_scans(process):
+    if short and law.algorithm.dahlin is None and _FEW * _scans_of_a_block(law, process, factor) > _most_scans(process):
         return _extrapolated(law, process, factor)
-    return _iae(law, process, factor, stable, _most_scans(process))
+    return _iae(law, process, factor, _most_scans(process))
 
 
 def continuous_load_iae(settings: Settings, process: Process, factor: float = 1.0) -> float:
@@ -96,7 +97,7 @@ def _extrapolated(law: Law, process: Process, factor: float) -> float:
     fine = [Law(_as_continuous(law.algorithm), t) for t in (h, h / 2)]
     if not all(loop_figures(x, process, factor).stable for x in fine):
         return math.nan
-    long, short = (_iae(x, process, factor, True, _most_scans(process) // 2) for x in fine)
+    long, short = (_iae(x, process, factor, _most_scans(process) // 2) for x in fine)
     share = (law.scan or 0.0) / (h / 2)
     return long if math.isinf(long) else (2 - share) * short - (1 - share) * long
 
@@ -121,11 +122,11 @@ def _scans_of_a_block(law: Law, process: Process, factor: float) -> int:
     return math.ceil(block / law.scan)
 
 
-def _iae(law: Law, process: Process, factor: float, stable: bool, most: int) -> float:
-    """Return the integral for a discrete law by so many scans; the factor is put into the process, which needs a smaller load."""
+def _iae(law: Law, process: Process, factor: float, most: int) -> float:
+    """Return the integral of a stable loop at the scans, by so many of them; the factor is put into the process."""
     a, h = law.algorithm, law.scan
     assert h is not None
-    if not stable or not (a.ki or a.dahlin is not None or 0 in process.zeros):
+    if not (a.ki or a.dahlin is not None or 0 in process.zeros):
         return math.inf
     scans = _scans_of_a_block(law, process, factor)
     if _FEWEST * scans > most:
