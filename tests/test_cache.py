@@ -294,3 +294,31 @@ def test_a_shared_object_of_another_in_a_shared_folder_is_never_loaded(tmp_path:
 
 def test_the_tests_keep_their_code_apart_from_the_users() -> None:
     assert not cache.folder().is_relative_to(platformdirs.user_cache_dir("pidemu", appauthor=False))
+
+
+@POSIX
+def test_nothing_is_made_in_a_folder_that_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    for named in (shared, shared / "code"):
+        monkeypatch.setenv("PIDEMU_CACHE", str(named))
+        cache.folder.cache_clear()
+        assert cache.folder().name.startswith("pidemu-")
+    assert list(shared.iterdir()) == []
+
+
+@POSIX
+def test_a_temporary_folder_is_trusted_no_more_than_the_one_that_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was compiled went there, and was loaded from it."""
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    monkeypatch.setenv("PIDEMU_CACHE", str(shared))
+    monkeypatch.setattr("tempfile.tempdir", str(shared))
+    with pytest.raises(PermissionError, match=f"others can write to {shared}, where temporary files go"):
+        cache.folder()
+    assert cache.load("scan_1", ".so") is None
+    assert list(shared.iterdir()) == []
+    shared.chmod(0o1777)  # as /tmp
+    assert cache.folder().parent == shared

@@ -7,6 +7,7 @@ name of each holds the SHA-256 of what is in it: one that is damaged, cut short 
 from __future__ import annotations
 
 import atexit
+import errno
 import functools
 import hashlib
 import logging
@@ -32,14 +33,14 @@ def folder() -> Path:
     Raises
     ------
     OSError
-        There is no room for a temporary folder either.
+        There is no room for a temporary folder either, or others could exchange it.
     """
     import platformdirs
 
     try:
         chosen = os.environ.get("PIDEMU_CACHE") or platformdirs.user_cache_dir("pidemu", appauthor=False)
-        path = _made(Path(os.path.realpath(Path(chosen).expanduser())) / __version__)
-        fault = _fault(path)
+        path = Path(os.path.realpath(Path(chosen).expanduser())) / __version__
+        fault = _fault(path) or _fault(_made(path))  # nothing is made where others could exchange it
         if fault:
             warn(f"{chosen}: not used for compiled code, as {fault}; name a folder of your own in PIDEMU_CACHE")
         else:
@@ -47,7 +48,11 @@ def folder() -> Path:
                 return path
     except (OSError, RuntimeError, ValueError):  # without a home it is a RuntimeError, with a NUL in the name a ValueError
         pass
-    path = Path(tempfile.mkdtemp(prefix="pidemu-"))
+    temporary = Path(os.path.realpath(tempfile.gettempdir()))
+    fault = _fault(temporary / "pidemu-", own=1)
+    if fault:
+        raise PermissionError(errno.EACCES, f"{fault}, where temporary files go (TMPDIR)")
+    path = Path(tempfile.mkdtemp(prefix="pidemu-", dir=temporary))
     atexit.register(shutil.rmtree, path, ignore_errors=True)
     return path
 
@@ -147,21 +152,23 @@ def _made(path: Path) -> Path:
     return path
 
 
-def _fault(path: Path) -> str:
-    """Return why others could put something into a folder, also by putting another one in its place; empty where they cannot."""
+def _fault(path: Path, own: int = 2) -> str:
+    """Return why others could put something into a folder, also by putting another one in its place; empty where they cannot.
+
+    It need not be there yet. It and those above it, so many as `own` says, must be this user's; further up, sticky ones that others
+    write to, as /tmp, are no danger: nobody moves there what is another's.
+    """
     if not hasattr(os, "geteuid"):  # Windows: what others may do with the user's folders is said by its lists, and is nothing
         return ""
-    for place in (path, path.parent):
-        if place.stat().st_uid != os.geteuid():
+    for above, place in enumerate((path, *path.parents)):
+        try:
+            found = place.stat()
+        except FileNotFoundError:
+            continue
+        if found.st_uid != os.geteuid() and (above < own or found.st_uid != 0):
             return f"{place} belongs to another user"
-        if _others_write(place.stat()):
+        if _others_write(found) and (above < own or not found.st_mode & stat.S_ISVTX):
             return f"others can write to {place}"
-    for above in path.parent.parents:
-        found = above.stat()
-        if found.st_uid not in (0, os.geteuid()):
-            return f"{above} belongs to another user"
-        if _others_write(found) and not found.st_mode & stat.S_ISVTX:  # in a sticky one, as /tmp, nobody moves what is another's
-            return f"others can write to {above}"
     return ""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import subprocess
 import sys
 from collections import deque
@@ -205,3 +206,19 @@ def test_a_library_that_the_system_does_not_load_is_an_error_with_the_remedy(mon
     monkeypatch.setattr("ctypes.CDLL", refused)
     with pytest.raises(EngineError, match=r"cannot load what it compiled: .*failed to map segment.*; name another folder in"):
         native.runner(delaying((1, 1)))
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="who may write is said otherwise there")
+def test_without_a_folder_that_is_safe_the_engine_says_so(no_code_yet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    no_code_yet.mkdir()
+    no_code_yet.chmod(0o777)
+    monkeypatch.setattr("tempfile.tempdir", str(no_code_yet))
+    settings = pidemu.load_card("generic/standard").settings(K=1, Ti=10, Td=0)
+    message = (
+        f"the engine 'c' cannot write what it compiles: others can write to {no_code_yet}, where temporary files go (TMPDIR); "
+        f"name another folder in PIDEMU_CACHE"
+    )
+    with pytest.raises(EngineError, match=re.escape(message)):
+        pidemu.Controller(settings, 1.0, engine="c").run(50.0, [49.0] * 3)
+    assert list(no_code_yet.iterdir()) == []

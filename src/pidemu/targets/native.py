@@ -128,7 +128,10 @@ def _compile(command: Sequence[str], text: str, stem: str) -> Path:
             source, made = Path(build, "scan.c"), Path(build, "scan.so")
             source.write_text(text, encoding="utf-8")
             words = [*command, "-o", str(made), str(source), "-lm"]
-            done = subprocess.run(words, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False)
+            own = {**os.environ, **dict.fromkeys(("TMPDIR", "TMP", "TEMP"), build)}  # what it makes on the way is code, too
+            done = subprocess.run(
+                words, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False, env=own
+            )
             if done.returncode:
                 first = next(iter(done.stderr.strip().splitlines()), f"exit status {done.returncode}")
                 raise EngineError(f"the C compiler '{command[0]}' does not compile a scan program: {first}; name another one in CC")
