@@ -1,5 +1,17 @@
-"""``python -m pidemu``."""
+"""The command ``pidemu``, also ``python -m pidemu``; Ctrl-C while it is still being loaded ends it with a word, too."""
 
-from pidemu.cli import main
+import sys
 
-main()
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        from pidemu.cli import main as run
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+    run()
+
+
+if __name__ == "__main__":
+    main()

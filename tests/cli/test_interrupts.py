@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import threading
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -79,3 +82,25 @@ def test_a_file_that_ends_too_early_is_not_taken_for_the_end_of_the_input(monkey
     monkeypatch.setattr(cards.command, "callback", command)
     with pytest.raises(RuntimeError, match="a file or stream ended too early"):
         said("cards")
+
+
+@POSIX
+def test_ctrl_c_while_the_command_is_loaded_ends_it_with_a_word() -> None:
+    code = (
+        "import signal, sys\n"
+        "class Interrupts:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'click':\n"
+        "            signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupts())\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from pidemu.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_the_start_script_is_the_one_that_sees_to_ctrl_c() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["scripts"] == {"pidemu": "pidemu.__main__:main"}
