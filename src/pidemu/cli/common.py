@@ -9,7 +9,7 @@ import sys
 import textwrap
 import unicodedata
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -17,7 +17,7 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.engines import ENGINES, Engine
 from pidemu.errors import SettingError
-from pidemu.excerpt import printable, printable_json, visible
+from pidemu.excerpt import printable, printable_json, shortened, visible
 from pidemu.plain import json_safe
 from pidemu.ranges import SignalRange, read_range
 from pidemu.words import assignments as assignments  # noqa: PLC0414
@@ -38,6 +38,10 @@ vendors_option = click.option(
     help="A folder of your own cards, <vendor>/<block>.yaml; searched first. Repeatable.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
+
+
+_CELL: Final = 200
+"""Characters of a cell of a table on the screen: one that is longer would widen every row."""
 
 
 class Pair(_PairType):
@@ -196,7 +200,7 @@ def table(
     err : bool
         Print on stderr.
     """
-    rows = [[visible(cell) for cell in row] for row in rows]
+    rows = [[shortened(visible(cell), _CELL) for cell in row] for row in rows]
     if (sys.stderr if err else sys.stdout).isatty():
         _rich(columns, rows, indent, right, err)
         return
