@@ -333,3 +333,84 @@ def test_cores_and_a_scheduler_are_one_too_many() -> None:
     status, out, err = said("fleet", "good.csv", "--cores", "2", "--scheduler", "tcp://127.0.0.1:8786")
     assert (status, out) == (2, "")
     assert err.endswith("Error: --cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out\n")
+
+
+def test_one_long_cell_does_not_widen_the_table_on_the_screen(folder: Path) -> None:
+    (folder / "long.csv").write_text(HEAD + FAST + FAST.replace("FIC-1", "T" * 100_000), encoding="utf-8")
+    out = told("fleet", "long.csv")
+    assert max(map(len, out.splitlines())) < 200
+    assert "T" * 40 + "…" + "T" * 20 in out
+
+
+def interrupt_after(blocks: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupt the next fleet where so many blocks, or loops that failed, are done."""
+    add = FleetResult.add
+    seen: list[Outcome | Failed] = []
+
+    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+        if len(seen) == blocks:
+            raise KeyboardInterrupt
+        seen.append(found)
+        return add(self, found)
+
+    monkeypatch.setattr(FleetResult, "add", interrupted)
+
+
+def test_an_interrupted_fleet_replaces_no_older_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    words = ["fleet", "good.csv", "--table", "out.csv", "--parquet", "out.pq", "--no-margins", "--cores", "1", "--engine", "python"]
+    told(*words)
+    before = {name: (folder / name).read_bytes() for name in ("out.csv", "out.pq")}
+    with monkeypatch.context() as patch:
+        interrupt_after(1, patch)
+        status, _, err = said(*words)
+    stay = "out.csv and out.pq are as they were, what is done is in out.interrupted.csv and out.interrupted.pq"
+    assert (status, err) == (130, f"interrupted: 1 of 2 loops are done; {stay}\n")
+    assert {name: (folder / name).read_bytes() for name in before} == before
+    assert [row["status"] for row in rows("out.interrupted.csv").values()].count("done") == 1
+    assert said(*words, "--resume").err == "resumed: 2 of 2 loops were done already\n"
+
+
+def test_a_fleet_that_is_interrupted_before_anything_is_done_writes_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    there = set(folder.iterdir())
+    interrupt_after(0, monkeypatch)
+    monkeypatch.setattr("pidemu.fleet.signals.SignalStore.stored", lambda self, outcome: outcome)
+    words = ["fleet", "good.csv", "--table", "out.csv", "--parquet", "out.pq", "--signals", "kept"]
+    assert said(*words).err == "interrupted: 0 of 2 loops are done\n"
+    assert set(folder.iterdir()) == there
+    (folder / "out.csv").write_text("older", encoding="utf-8")
+    assert said(*words).err == "interrupted: 0 of 2 loops are done; out.csv is as it was\n"
+    assert (folder / "out.csv").read_text(encoding="utf-8") == "older"
+
+
+OVERLAPPING = {
+    "--table o.csv --parquet o.csv": "--table o.csv and --parquet o.csv are the same; give each its own name",
+    "--table o.csv --parquet ./o.csv": "--table o.csv and --parquet ./o.csv are the same; give each its own name",
+    "--table s --signals s": "--table s and --signals s are the same; give each its own name",
+    "--table s/signals.csv --signals s": (
+        "--table s/signals.csv lies in --signals s, where nothing else may be written; give another place"
+    ),
+    "--parquet s/o.pq --signals s": "--parquet s/o.pq lies in --signals s, where nothing else may be written; give another place",
+    "--parquet o.pq --signals o.pq.parts": (
+        "--signals o.pq.parts and the parts of --parquet o.pq are the same; give each its own name"
+    ),
+    "--parquet o.pq --table o.pq.parts/o.csv": (
+        "--table o.pq.parts/o.csv lies in the parts of --parquet o.pq, where nothing else may be written; give another place"
+    ),
+    "--signals ": "--signals '' names no folder; give one",
+}
+
+
+@pytest.mark.parametrize(("words", "message"), OVERLAPPING.items())
+def test_outputs_that_would_destroy_each_other_are_refused_before_the_work(words: str, message: str, folder: Path) -> None:
+    there = set(folder.iterdir())
+    assert said("fleet", "good.csv", *words.split(" ")) == (2, "", f"error: {message}\n")
+    assert set(folder.iterdir()) == there
+
+
+def test_the_index_of_a_folder_of_signals_is_not_overwritten_by_a_table(folder: Path) -> None:
+    told("fleet", "good.csv", "--signals", "s")
+    before = (folder / "s" / "signals.csv").read_bytes()
+    assert said("fleet", "good.csv", "--signals", "s", "--resume", "--table", "s/signals.csv").status == 2
+    assert (folder / "s" / "signals.csv").read_bytes() == before

@@ -16,6 +16,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
+from pidemu.cache import warn
 from pidemu.fleet import finished, local
 from pidemu.fleet.finished import keys
 from pidemu.fleet.folder import INDEX
@@ -155,37 +156,100 @@ def test_an_index_that_was_not_written_whole_loses_its_last_rows_only(
     assert {path.name for path in (tmp_path / "f").iterdir()} == listed
 
 
-@pytest.mark.parametrize("damage", ["gone", "emptied", "cut short", "other numbers"])
+@pytest.mark.parametrize("damage", ["gone", "emptied", "cut short", "other numbers", "a byte changed", "a link"])
 def test_loops_of_a_block_whose_file_is_damaged_are_run_again(
-    damage: str, expected: FleetResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    damage: str, expected: FleetResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     first = interrupted(tmp_path / "f", None, monkeypatch)
     block = sorted((tmp_path / "f").glob("*.npy"))[0]
     sound = block.read_bytes()
-    if damage == "gone":
+    if damage in ("gone", "a link"):
         block.unlink()
+    if damage == "a link":
+        (tmp_path / "elsewhere.npy").write_bytes(sound)
+        block.symlink_to(tmp_path / "elsewhere.npy")
     elif damage == "other numbers":
         np.save(block, np.zeros((2, 300, 64), dtype=np.float32))
-    else:
-        block.write_bytes(b"" if damage == "emptied" else sound[: len(sound) // 2])
+    elif damage != "gone":
+        changed = sound[:-900] + bytes([sound[-900] ^ 1]) + sound[-899:]
+        block.write_bytes({"emptied": b"", "cut short": sound[: len(sound) // 2], "a byte changed": changed}[damage])
+    warn.cache_clear()
     result = Fleet(loops()).simulate(**STEPS, folder=tmp_path / "f", resume=True)
+    what = {"gone": "missing", "a link": "no file of its own"}.get(damage, "damaged")
+    assert caplog.messages == [f"note: {tmp_path / 'f'}: {block.name} is {what}; the loops in it are run again"]
     assert 0 < result.resumed < first.counts["done"]
     check(result, expected)
 
 
-def test_a_part_that_is_damaged_is_run_again(expected: FleetResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_every_block_is_damaged_all_loops_are_run_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """It was said that none of the loops was one of this fleet."""
+    Fleet(alike(8)).simulate(**STEPS, folder=tmp_path / "f")
+    (block,) = (tmp_path / "f").glob("*.npy")
+    block.write_bytes(block.read_bytes()[:-1])
+    warn.cache_clear()
+    result = Fleet(alike(8)).simulate(**STEPS, folder=tmp_path / "f", resume=True)
+    assert (result.resumed, result.counts) == (0, {"done": 8})
+    assert caplog.messages == [f"note: {tmp_path / 'f'}: {block.name} is damaged; the loops in it are run again"]
+
+
+@pytest.mark.parametrize("where", ["folder", "parquet"])
+def test_what_a_run_is_still_writing_is_left_alone_by_another(where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place: dict[str, Any] = {where: tmp_path / "place"}
+    locked = place[where] if where == "folder" else f"{place[where]}.parts"
+    add = FleetResult.add
+    refused: list[str] = []
+
+    def another(self: FleetResult, found: Any) -> int:
+        if not refused:
+            with pytest.raises(FleetError) as error:
+                Fleet(loops()).simulate(**STEPS, **place, resume=True)
+            refused.append(str(error.value))
+        return add(self, found)
+
+    monkeypatch.setattr(FleetResult, "add", another)
+    result = Fleet(loops()).simulate(**STEPS, **place, engine="python", cores=1)
+    assert refused == [f"{locked}: another run is writing there; wait until it has ended, or give another place"]
+    assert result.counts["failed"] == 1
+    assert "not run" not in result.counts
+    monkeypatch.undo()
+    assert Fleet(loops()).simulate(**STEPS, **place, resume=True).resumed == len(loops()) - 1
+
+
+def test_an_interrupted_run_goes_on_from_what_stands_beside_an_older_file(
+    expected: FleetResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parquet = tmp_path / "fleet.parquet"
+    parquet.write_bytes(b"older")
+    first = interrupted(None, parquet, monkeypatch)
+    assert parquet.read_bytes() == b"older"
+    assert parquet_of(tmp_path / "fleet.interrupted.parquet").keys() >= {
+        loop.tag for loop, status in zip(first.loops, first.status, strict=True) if status == "done"
+    }
+    result = Fleet(loops()).simulate(**STEPS, parquet=parquet, resume=True)
+    assert result.resumed >= first.counts["done"]
+    check(result, expected, signals=False)
+    assert list(tmp_path.iterdir()) == [parquet]
+
+
+def test_a_part_that_is_damaged_is_run_again(
+    expected: FleetResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     parquet = tmp_path / "fleet.parquet"
     with monkeypatch.context() as patch:
-        patch.setattr("pidemu.fleet.parquet.ParquetFile.close", lambda *_, **__: None)  # as where the process is killed
+        patch.setattr("pidemu.fleet.parquet.ParquetFile._join", lambda *_: None)  # as where the process is killed
         interrupted(None, parquet, monkeypatch)
     parts = sorted((tmp_path / "fleet.parquet.parts").iterdir())
     assert len(parts) == 2 or len(parts) == 3
     assert not parquet.exists()
     with pytest.raises(FleetError, match=r"fleet.parquet.parts holds what a run had done that did not end; go on with it"):
         Fleet(loops()).simulate(**STEPS, parquet=parquet)
-    parts[0].write_bytes(parts[0].read_bytes()[:-50])
+    sound = parts[0].read_bytes()
+    middle = len(sound) // 2  # in the signals
+    parts[0].write_bytes(sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :])
+    warn.cache_clear()
     result = Fleet(loops()).simulate(**STEPS, parquet=parquet, resume=True)
     assert result.resumed > 0
+    assert caplog.messages == [f"note: {parquet}: {parts[0].name} is damaged; the loops in it are run again"]
     check(result, expected, signals=False)
     assert sorted(parquet_of(parquet)) == sorted(loop.tag for loop in loops() if loop.tag != "fails")
 

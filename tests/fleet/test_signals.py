@@ -56,7 +56,7 @@ def test_a_folder_holds_the_signals_of_every_loop(engine: Engine, tmp_path: Path
     result = Fleet(loops).simulate(**STEPS, folder=tmp_path / "deep" / "signals", engine=engine)
     folder = tmp_path / "deep" / "signals"
     index = read_index(folder)
-    assert list(index[0]) == ["tag", "file", "loop", *FIELDS]
+    assert list(index[0]) == ["tag", "file", "loop", "sha256", *FIELDS]
     assert sorted(row["tag"] for row in index) == sorted(loop.tag for loop in loops[:-1])
     assert {path.name for path in folder.iterdir()} == {INDEX, *(row["file"] for row in index)}
     places = {loop.tag: i for i, loop in enumerate(loops)}
@@ -78,7 +78,7 @@ def test_a_folder_is_used_once(tmp_path: Path) -> None:
     with pytest.raises(
         FleetError, match=r"holds the signals of a fleet already; go on with them \(--resume, resume=True\), give another"
     ):
-        Fleet(alike(4)).simulate(**STEPS, folder=tmp_path, parquet=tmp_path / "fleet.parquet")
+        Fleet(alike(4)).simulate(**STEPS, folder=tmp_path)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     (tmp_path / INDEX).unlink()  # as after a run that was killed
     with pytest.raises(FleetError, match="holds the signals of a fleet already"):

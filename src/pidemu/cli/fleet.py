@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import click
@@ -32,6 +34,7 @@ from pidemu.fleet.fleet import Fleet
 from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.result import FleetResult
 from pidemu.fleet.table import LoopTable, read_loops
+from pidemu.fleet.writing import instead_of, refuse_overlap
 from pidemu.plain import json_safe
 
 _ROWS: Final = 20
@@ -103,9 +106,15 @@ def command(
         echo(f"note: {file}: {loops.skipped}", err=True)
     for wrong in loops.wrong:
         echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
+    if signals == "":
+        raise FleetError("--signals '' names no folder; give one")
+    refuse_overlap({"--table": target, "--signals": signals, "--parquet": parquet})
+    partly: dict[str, Path] = {}  # where what an interrupted run has done goes
     for path in (target, parquet):
         if path is not None:  # now, and not after the work
             check(path, FleetError, [file])
+            partly[path] = instead_of(path)
+            check(partly[path], FleetError, [file])
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(
@@ -113,15 +122,19 @@ def command(
             cluster=scheduler, progress=progress, resume=resume, worker_timeout=worker_timeout,
             **given(setpoint=setpoint, load=load),
         )  # fmt: skip
-    if target is not None:
+    interrupted = result is not None and result.interrupted
+    if target is not None and not interrupted:
         loops.write(target, result)
+    elif target is not None and _done(result):
+        loops.write(partly[target], result)
     rows = list(loops.rows(result))
     if as_json:
         print_json(_plain(loops, rows, result))
     else:
         _print(loops, rows, engines=verbose or engine is not None)
     _say(loops, result, verbose)
-    if result is not None and result.interrupted:
+    if interrupted:
+        echo(f"interrupted: {_done(result):,} of {len(loops):,} loops are done{_where(partly, _done(result))}", err=True)
         raise SystemExit(interrupts.status())
     if result is None or any(row["status"] == "failed" for row in rows):
         raise SystemExit(1)
@@ -137,9 +150,20 @@ def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
             echo(loops.located(line, loop.tag, message), err=True)
     if result.resumed:
         echo(f"resumed: {result.resumed:,} of {len(loops):,} loops were done already", err=True)
-    if result.interrupted:
-        done = sum(result.counts[status] for status in RAN)
-        echo(f"interrupted: {done:,} of {len(loops):,} loops are done", err=True)
+
+
+def _done(result: FleetResult | None) -> int:
+    """Return how many loops ran."""
+    return 0 if result is None else sum(result.counts[status] for status in RAN)
+
+
+def _where(partly: Mapping[str, Path], done: int) -> str:
+    """Say where what is done stands, where that is not where the whole would."""
+    kept = {path: other for path, other in partly.items() if Path(path) != other and os.path.lexists(path)}
+    if not kept:
+        return ""
+    stay = f"{' and '.join(map(quoted, kept))} {'is as it was' if len(kept) == 1 else 'are as they were'}"
+    return f"; {stay}" + (f", what is done is in {' and '.join(map(quoted, kept.values()))}" if done else "")
 
 
 def _plain(loops: LoopTable, rows: Sequence[Mapping[str, Any]], result: FleetResult | None) -> dict[str, Any]:
@@ -196,7 +220,7 @@ def _cells(row: Mapping[str, Any]) -> list[str]:
     """Return a row of the table for people."""
     figures = (row["iae"], row["peak"], row["travel"], row["at_low"] + row["at_high"], row["error"])
     margins = (math.nan if row[name] is None else row[name] for name in MARGINS)
-    return [row["tag"], row["card"], f"{number(row['scan'])} s", *map(_figure, (*figures, *margins))]
+    return [quoted(row["tag"]), quoted(row["card"]), f"{number(row['scan'])} s", *map(_figure, (*figures, *margins))]
 
 
 def _remark(row: Mapping[str, Any]) -> str:

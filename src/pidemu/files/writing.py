@@ -83,6 +83,15 @@ def check(path: str | Path, error: type[PidemuError], inputs: Iterable[str | Pat
             unfinished.unlink()
 
 
+def is_replaced(path: str | Path) -> bool:
+    """Tell whether a file stands there that a new one would replace."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISREG(found.st_mode) and _standard(found) is None
+
+
 @contextlib.contextmanager
 def _beside(path: str | Path, error: type[PidemuError], inputs: tuple[str | Path, ...], binary: bool) -> Iterator[IO[Any]]:
     name = visible(str(path))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import io
 import itertools
 import os
+import stat
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +21,13 @@ from pidemu.errors import FleetError
 from pidemu.files.tables import text_cell, write_rows
 from pidemu.files.writing import beside
 from pidemu.fleet.finished import FIELDS, Finished, read_row
-from pidemu.fleet.writing import writing
+from pidemu.fleet.lock import FolderLock
+from pidemu.fleet.writing import End, after, writing
 
 Floats = npt.NDArray[np.float64]
 INDEX: Final = "signals.csv"
 """The file of a folder that says where the signals of each loop are, and what came of it."""
-_HEADER: Final = ("tag", "file", "loop", *FIELDS)
+_HEADER: Final = ("tag", "file", "loop", "sha256", *FIELDS)
 _BLOCK: Final = "block-{}.npy"
 _ROOM: Final = "give a folder that can be written, with enough room"
 
@@ -36,8 +39,8 @@ class SignalFolder:
     """A folder of signals.
 
     ``block-N.npy`` has the shape (2, scans, loops): output and measurement [%], NaN after a loop's last scan. `INDEX` has a row per
-    loop: tag, file, the loop's number in it, and `FIELDS`. A block is listed when its file is on the disk, so that what is listed
-    is complete, whatever ends the run.
+    loop: tag, file, the loop's number in it, the file's SHA-256, and `FIELDS`. A block is listed when its file is on the disk, so
+    that what is listed is complete, whatever ends the run.
 
     Parameters
     ----------
@@ -50,6 +53,8 @@ class SignalFolder:
     ----------
     listed : bool
         Whether `found` found loops in the index, of whatever fleet.
+    damaged : list of str
+        What is wrong with blocks whose loops are to be run again.
 
     Raises
     ------
@@ -61,21 +66,38 @@ class SignalFolder:
         self._folder = folder.resolve()  # as NumPy names its files
         self._unfinished: set[Path] = set()
         self.listed = False
+        self.damaged: list[str] = []
+        self._digests: dict[str, str] = {}
         self._lock = threading.Lock()
+        self._alone: FolderLock | None = None
+        self._numbers = itertools.count(1)
         with writing(self._folder, "give a folder that can be made and written"):
+            self._made = not self._folder.exists()
             self._folder.mkdir(parents=True, exist_ok=True)
-            blocks = sorted(self._folder.glob(_BLOCK.format("*")))
+            blocks = self._blocks()
         self._index = self._folder / INDEX
         if (self._index.exists() or blocks) and not resume:
             raise FleetError(
                 f"{folder} holds the signals of a fleet already; go on with them (--resume, resume=True), give another folder, "
                 f"or empty it"
             )
-        numbers = (path.stem.rpartition("-")[2] for path in blocks)
-        self._numbers = itertools.count(1 + max((int(n) for n in numbers if n.isdecimal()), default=0))
 
     def __str__(self) -> str:
         return str(self._folder)
+
+    def _blocks(self) -> list[Path]:
+        return sorted(self._folder.glob(_BLOCK.format("*")))
+
+    def lock(self) -> None:
+        """Keep other runs out until `close`; what is there by now stays what it is.
+
+        Raises
+        ------
+        FleetError
+            Another run is writing here.
+        """
+        self._alone = FolderLock(self._folder)
+        self._numbers = after(self._blocks())
 
     def found(self, wanted: Mapping[str, str]) -> dict[str, tuple[Finished, Place]]:
         """Return what is complete here, by tag.
@@ -86,7 +108,8 @@ class SignalFolder:
             Key by tag: what was run otherwise does not count.
         """
         written = {str(text_cell(tag)): tag for tag in wanted}
-        shapes: dict[str, tuple[int, ...]] = {}
+        blocks: dict[str, _Block] = {}
+        faults: dict[str, str] = {}
         kept: dict[str, tuple[Finished, Place]] = {}
         for cells in self._rows():
             self.listed = True
@@ -96,11 +119,15 @@ class SignalFolder:
                 one, lane = read_row(tag, row), int(row["loop"])
                 if one.key != wanted[tag]:
                     continue
-                if name not in shapes:
-                    shapes[name] = _shape(self._folder / name)
-                _, scans, lanes = shapes[name]
-                if one.scans <= scans and 0 <= lane < lanes:
+                if name not in blocks:
+                    blocks[name] = _look(self._folder / name)
+                shape, digest, fault = blocks[name]
+                if digest != row["sha256"] or not (one.scans <= shape[1] and 0 <= lane < shape[2]):
+                    faults[name] = f"{name} is {fault or 'damaged'}"
+                else:
                     kept[tag] = one, (self._folder / name, lane)
+        self.damaged = list(faults.values())
+        self._digests = {name: block.digest for name, block in blocks.items()}
         return kept
 
     def _rows(self) -> Iterator[list[str]]:
@@ -131,8 +158,8 @@ class SignalFolder:
         else:
             files = {path for _, (path, _) in kept}
             with beside(self._index, FleetError) as stream:
-                write_rows(stream, [_HEADER, *(_row(one, place) for one, place in kept)])
-        for path in self._folder.glob(_BLOCK.format("*")):
+                write_rows(stream, [_HEADER, *(self._row(one, place) for one, place in kept)])
+        for path in self._blocks():
             if path not in files:
                 with contextlib.suppress(OSError):
                     path.unlink()
@@ -180,26 +207,31 @@ class SignalFolder:
             records.flush()
             with path.open("r+b") as file:
                 os.fsync(file.fileno())
+            self._digests[path.name] = _digest(path)
         self._unfinished.discard(path)  # first: what is listed is never removed, wherever Ctrl-C comes
         text = io.StringIO()
-        write_rows(text, ([] if self._index.exists() else [_HEADER]) + [_row(one, (path, i)) for i, one in enumerate(rows)])
+        write_rows(text, ([] if self._index.exists() else [_HEADER]) + [self._row(one, (path, i)) for i, one in enumerate(rows)])
         with writing(self._index, _ROOM):
             _append(self._index, text.getvalue().encode(errors="backslashreplace"))
         return path
 
-    def close(self, *, finished: bool) -> None:
+    def _row(self, one: Finished, place: Place) -> list[Any]:
+        row = one.row
+        return [one.tag, place[0].name, place[1], self._digests[place[0].name], *(row[name] for name in FIELDS)]
+
+    def close(self, how: End) -> None:
         """Remove the files of blocks that were not finished; a folder of a run that is over has an index, if an empty one."""
         for path in self._unfinished:
             with contextlib.suppress(OSError):
                 path.unlink()
-        if finished and not self._index.exists():
+        if how == "finished" and not self._index.exists():
             with beside(self._index, FleetError) as stream:
                 write_rows(stream, [_HEADER])
-
-
-def _row(one: Finished, place: Place) -> list[Any]:
-    row = one.row
-    return [one.tag, place[0].name, place[1], *(row[name] for name in FIELDS)]
+        if self._made:
+            with contextlib.suppress(OSError):
+                self._folder.rmdir()  # where it is empty
+        if self._alone is not None:
+            self._alone.release()
 
 
 def _append(path: Path, data: bytes) -> None:
@@ -219,10 +251,27 @@ def _append(path: Path, data: bytes) -> None:
         os.close(number)
 
 
-def _shape(path: Path) -> tuple[int, ...]:
-    """Return the shape of the records of a block; one of no loops where the file does not hold them."""
+class _Block(NamedTuple):
+    """What the file of a block holds: the shape of its records, the hash of all of it, or what is wrong."""
+
+    shape: tuple[int, ...] = (0, 0, 0)
+    digest: str = ""
+    fault: str = ""
+
+
+def _look(path: Path) -> _Block:
     try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return _Block(fault="no file of its own")
         records = np.load(path, mmap_mode="r", allow_pickle=False)
+        sound = records.ndim == 3 and records.dtype == np.float64
+        return _Block(records.shape, _digest(path)) if sound else _Block()
+    except FileNotFoundError:
+        return _Block(fault="missing")
     except (OSError, ValueError, EOFError):
-        return 0, 0, 0
-    return records.shape if records.ndim == 3 and records.dtype == np.float64 else (0, 0, 0)
+        return _Block()
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from pidemu.errors import FleetError
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import UNFINISHED, beside, check
 from pidemu.fleet.blocks import COLUMNS, Outcome
 from pidemu.fleet.finished import FIELDS, Finished, read_row
 from pidemu.fleet.judgement import MARGINS
-from pidemu.fleet.writing import writing
+from pidemu.fleet.lock import FolderLock
+from pidemu.fleet.writing import End, after, instead_of, interrupted_name, writing
 
 _PART: Final = "part-{}.parquet"
 _SIGNALS: Final = ("output", "measurement")
@@ -37,6 +37,8 @@ class ParquetFile:
     ----------
     listed : bool
         Whether `found` found loops, of whatever fleet.
+    damaged : list of str
+        What is wrong with parts whose loops are to be run again.
 
     Raises
     ------
@@ -56,19 +58,36 @@ class ParquetFile:
         self._schema: Any = _schema(pa)
         self._path, self._parts = path, path.with_name(f"{path.name}.parts")
         check(path, FleetError)
-        parts = sorted(self._parts.glob(_PART.format("*")))
-        if parts and not resume:
+        if self._there() and not resume:
             raise FleetError(
                 f"{self._parts} holds what a run had done that did not end; go on with it (--resume, resume=True), or remove it"
             )
-        numbers = (part.stem.rpartition("-")[2] for part in parts)
-        self._numbers = itertools.count(1 + max((int(n) for n in numbers if n.isdecimal()), default=0))
-        self._there = [path, *parts] if resume else []
+        self._resume = resume
+        self._alone: FolderLock | None = None
+        self._numbers = itertools.count(1)
+        self._begun = False
         self._taken: list[tuple[Path, set[str]]] = []
         self.listed = False
+        self.damaged: list[str] = []
 
     def __str__(self) -> str:
         return str(self._path)
+
+    def _there(self) -> list[Path]:
+        return sorted(self._parts.glob(_PART.format("*")))
+
+    def lock(self) -> None:
+        """Keep other runs out until `close`.
+
+        Raises
+        ------
+        FleetError
+            Another run is writing the file, or the folder of its parts cannot be made.
+        """
+        with writing(self._parts, "give a file in a folder that can be written"):
+            self._parts.mkdir(exist_ok=True)
+        self._alone = FolderLock(self._parts)
+        self._numbers = after(self._there())
 
     def found(self, wanted: Mapping[str, str]) -> dict[str, Finished]:
         """Return what is complete here, by tag.
@@ -80,27 +99,33 @@ class ParquetFile:
         """
         kept: dict[str, Finished] = {}
         self._taken = []
-        for path in self._there:
-            every = list(self._rows(path))
+        for path in [self._path, interrupted_name(self._path), *self._there()] if self._resume else []:
+            try:
+                every = self._rows(path)
+            except (OSError, ValueError, TypeError, KeyError):  # Arrow's are such
+                every = []
+                if path.parent == self._parts:
+                    self.damaged.append(f"{path.name} is damaged")
             self.listed = self.listed or bool(every)
             rows = {one.tag: one for one in every if wanted.get(one.tag) == one.key and one.tag not in kept}
             self._taken.append((path, set(rows)))
             kept |= rows
         return kept
 
-    def _rows(self, path: Path) -> Iterator[Finished]:
-        """Yield the loops of a file; what is not a file of these is no part of it."""
-        with contextlib.suppress(OSError, ValueError, TypeError, KeyError), self._pq.ParquetFile(path) as file:  # Arrow's are such
-            if file.schema_arrow.equals(self._schema):
-                for row in file.read(["tag", *FIELDS]).to_pylist():
-                    yield read_row(row["tag"], row)
+    def _rows(self, path: Path) -> list[Finished]:
+        """Return the loops of a file, all of which is read: that its numbers are what was written is seen then only."""
+        with self._pq.ParquetFile(path, page_checksum_verification=True) as file:
+            if not file.schema_arrow.equals(self._schema):
+                return []
+            for group in range(file.num_row_groups):
+                file.read_row_group(group)
+            return [read_row(row["tag"], row) for row in file.read(["tag", *FIELDS]).to_pylist()]
 
     def begin(self, kept: Iterable[str]) -> None:
         """Take the tags that go on to count, of those that `found` returned."""
         tags = set(kept)
         self._taken = [(path, own & tags) for path, own in self._taken]
-        with writing(self._parts, "give a file in a folder that can be written"):
-            self._parts.mkdir(exist_ok=True)
+        self._begun = True
 
     def add(self, outcome: Outcome, rows: Sequence[Finished]) -> None:
         """Write a block.
@@ -123,26 +148,42 @@ class ParquetFile:
         }
         part = self._parts / _PART.format(f"{next(self._numbers):05d}")
         with beside(part, FleetError, binary=True) as stream:
-            self._pq.write_table(self._pa.table(columns, schema=self._schema), stream)
+            self._pq.write_table(self._pa.table(columns, schema=self._schema), stream, write_page_checksum=True)
         self._taken.append((part, {one.tag for one in rows}))
 
-    def close(self, *, finished: bool) -> None:
-        """Make one file of the parts where the run is over; else leave them to a run that goes on.
+    def close(self, how: End) -> None:
+        """Make one file of the parts where the run is over or interrupted; else leave them to a run that goes on.
+
+        An interrupted run replaces no older file, and writes none where it did nothing.
 
         Raises
         ------
         FleetError
             The file cannot be written; the parts are there.
         """
-        if finished:
-            with beside(self._path, FleetError, binary=True) as stream, self._pq.ParquetWriter(stream, self._schema) as writer:
-                for path, tags in self._taken:
-                    if tags:
-                        self._copy(path, tags, writer)
-            shutil.rmtree(self._parts, ignore_errors=True)
-        else:
+        if self._alone is None:  # another run is writing
+            return
+        try:
+            interrupted = how == "interrupted" and any(tags for path, tags in self._taken if path != self._path)
+            if self._begun and (how == "finished" or interrupted):
+                self._join(instead_of(self._path) if interrupted else self._path)
             with contextlib.suppress(OSError):
                 self._parts.rmdir()  # where it is empty
+        finally:
+            self._alone.release()
+
+    def _join(self, target: Path) -> None:
+        with (
+            beside(target, FleetError, binary=True) as stream,
+            self._pq.ParquetWriter(stream, self._schema, write_page_checksum=True) as writer,
+        ):
+            for path, tags in self._taken:
+                if tags:
+                    self._copy(path, tags, writer)
+        taken = [path for path, tags in self._taken if tags and path not in (target, self._path)]
+        for path in {*taken, *self._there(), *self._parts.glob(f".*{UNFINISHED}")}:
+            with contextlib.suppress(OSError):
+                path.unlink()
 
     def _copy(self, path: Path, tags: set[str], writer: Any) -> None:
         with self._pq.ParquetFile(path) as file:

@@ -7,16 +7,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.finished import Finished, finished
 from pidemu.fleet.folder import Place, SignalFolder
 from pidemu.fleet.parquet import ParquetFile
+from pidemu.fleet.writing import End, refuse_overlap
 
+_FAULTS: Final = 5
+"""Damaged files that are named; there may be thousands."""
 Floats = npt.NDArray[np.float64]
 
 
@@ -48,6 +53,7 @@ class SignalStore:
                 "there is nothing to go on with: what is done is kept where signals go to files; "
                 "give the folder (--signals, folder=) or the Parquet file (--parquet, parquet=) of the run that did not end"
             )
+        refuse_overlap({"folder": folder, "parquet": parquet})
         self._keep = keep
         self._folder = None if folder is None else SignalFolder(Path(folder), resume)
         self._parquet = None if parquet is None else ParquetFile(Path(parquet), resume)
@@ -62,11 +68,18 @@ class SignalStore:
             Tag and key of every loop of the fleet. What was run with other ones is dropped.
         """
         self._keys = keys
+        for place in (self._folder, self._parquet):
+            if place is not None:
+                place.lock()
         wanted = dict(zip(tags, keys, strict=True))
         in_folder = None if self._folder is None else self._folder.found(wanted)
         in_parquet = None if self._parquet is None else self._parquet.found(wanted)
         kept = [t for t in tags if (in_folder is None or t in in_folder) and (in_parquet is None or t in in_parquet)]
-        if not kept and ((self._folder and self._folder.listed) or (self._parquet and self._parquet.listed)):
+        damaged = [fault for place in (self._folder, self._parquet) if place is not None for fault in place.damaged]
+        if damaged:
+            more = f" and {len(damaged) - _FAULTS} more" if len(damaged) > _FAULTS else ""
+            warn(f"{self._folder or self._parquet}: {', '.join(damaged[:_FAULTS])}{more}; the loops in it are run again")
+        elif not kept and ((self._folder and self._folder.listed) or (self._parquet and self._parquet.listed)):
             raise FleetError(
                 f"none of the loops in {self._folder or self._parquet} is one of this fleet as it is run now, with its settings, "
                 f"process, steps and this version of pidemu; give the place of the run that did not end, or an empty one"
@@ -115,9 +128,9 @@ class SignalStore:
         return replace(outcome, records=None, file=path)  # an open file for every block would be too many
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        over = kind is None or issubclass(kind, KeyboardInterrupt)  # what was done by then is whole
+        how: End = "finished" if kind is None else "interrupted" if issubclass(kind, KeyboardInterrupt) else "failed"
         with contextlib.ExitStack() as both:  # whatever becomes of one of them, the other is closed
             if self._parquet is not None:
-                both.callback(self._parquet.close, finished=over)
+                both.callback(self._parquet.close, how)
             if self._folder is not None:
-                both.callback(self._folder.close, finished=over)
+                both.callback(self._folder.close, how)
