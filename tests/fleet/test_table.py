@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import pidemu
+from pidemu.card.library import builtin_folder
 from pidemu.errors import CardNotFoundError, FleetError
 from pidemu.fleet import table
 from pidemu.fleet.result import HEADER
@@ -240,7 +241,7 @@ def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, 
             raise error
         return real(name, *rest)
 
-    monkeypatch.setattr(table, "load_card", load_card)
+    monkeypatch.setattr(table, "load_card_by_id", load_card)
     path = tmp_path / "loops.csv"
     rows = ('A,generic/standard,K=1; Ti=10,"gain=1,lag=9"', 'B,emerson/deltav,GAIN=1,"gain=1,lag=9"')
     path.write_text("tag,card,settings,process\n" + "\n".join(rows) + "\n", encoding="utf-8")
@@ -248,3 +249,15 @@ def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, 
     assert [loop.tag for loop in found.loops] == ["A"]
     assert [(row.tag, row.line) for row in found.wrong] == [("B", 3)]
     assert found.wrong[0].reason.startswith(f"internal error of this loop ({type(error).__name__}: {error})")
+
+
+def test_a_list_names_cards_by_id_and_no_file_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    evil = tmp_path / "evil" / "fisher" / "provox.yaml"
+    evil.parent.mkdir(parents=True)
+    evil.write_bytes((builtin_folder() / "fisher" / "provox.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    for name in ("evil/fisher/provox.yaml", str(evil), "not/there.yml", "//host/share/provox.yaml"):
+        expected = f"'{name}' is a file, not the id of a card; name its folder with --vendors"
+        assert reason(tmp_path, f'FIC-2,{name},GAIN=2; RESET=4,"gain=1,lag=10",,,,,,') == expected
+    (loop,) = read_loops(tmp_path / "loops.csv", [tmp_path / "evil"]).loops
+    assert loop.settings.card.id == "generic/standard"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pidemu.card.library import folders, load_card
+from pidemu.card.library import folders, load_card_by_id
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
@@ -219,7 +219,7 @@ def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequ
                 found["output_limits" if name == "limits" else name] = read(row[name])
             except SettingError as error:
                 raise SettingError(f"{name}: {error}") from None
-    settings = load_card(row["card"], vendors).settings(given)
+    settings = load_card_by_id(row["card"], vendors).settings(given)
     return Loop(row["tag"], settings, parse_process(row["process"]), **found)
 
 
