@@ -10,6 +10,7 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
+    Output,
     action_option,
     assignments,
     echo,
@@ -69,8 +70,12 @@ class Scans(_ScansType):
     type=float,
     help="Output before the first scan; by default the first recorded one, else 0; 50 with the standard record.",
 )
-@click.option("-o", "--output", "target", metavar="FILE.csv", help="Where to write the signals and all outputs, as columns.")
-@click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw the signals, outputs and differences; needs matplotlib.")
+@click.option(
+    "-o", "--output", "target", type=Output(), metavar="FILE.csv", help="Where to write the signals and all outputs, as columns."
+)
+@click.option(
+    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw the signals, outputs and differences; needs matplotlib."
+)
 @vendors_option
 @json_option
 def command(

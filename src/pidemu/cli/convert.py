@@ -13,6 +13,7 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
 from pidemu.cli.common import (
+    Output,
     Pair,
     Range,
     Scan,
@@ -126,7 +127,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     metavar="YYYY-MM-DD",
     help="Date of the certificate; by default today.",
 )
-@click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
+@click.option("--html", "page", type=Output(), metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
 def command(

@@ -11,6 +11,7 @@ import click
 
 from pidemu.cli import interrupts
 from pidemu.cli.common import (
+    Output,
     Time,
     asked_for,
     echo,
@@ -49,9 +50,11 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 @click.option("--margins/--no-margins", default=True, help="Compute margins and stability, which takes about as long as the run.")
 @click.option("--cores", type=click.IntRange(min=1), metavar="N", help="Threads on this machine; by default one per core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: its scheduler's address, such as tcp://HOST:8786.")
-@click.option("--table", "target", metavar="FILE.csv", help="Write the table: a row per loop.")
-@click.option("--signals", metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files.")
-@click.option("--parquet", metavar="FILE", help="Write table and signals as a Parquet file.")
+@click.option("--table", "target", type=Output(), metavar="FILE.csv", help="Write the table: a row per loop.")
+@click.option(
+    "--signals", type=Output("folder"), metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files."
+)
+@click.option("--parquet", type=Output(), metavar="FILE", help="Write table and signals as a Parquet file.")
 @click.option("--resume", is_flag=True, help="Go on with a run that did not end: with what it left in --signals and --parquet.")
 @click.option(
     "--worker-timeout",

@@ -11,6 +11,7 @@ import numpy as np
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
+    Output,
     action_option,
     asked_for,
     assignments,
@@ -64,11 +65,14 @@ from pidemu.scan.build import Action
     "-o",
     "--output",
     "target",
+    type=Output(),
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
 @engine_option
-@click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib.")
+@click.option(
+    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib."
+)
 @vendors_option
 @json_option
 def command(

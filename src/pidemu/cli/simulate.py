@@ -12,6 +12,7 @@ from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.certificate.models import LoopFigures
 from pidemu.cli.common import (
+    Output,
     Pair,
     Time,
     asked_for,
@@ -81,7 +82,9 @@ _MARGINS: Final = {
 @click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
 @click.option("--limits", type=Pair(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
 @engine_option
-@click.option("-o", "--out", "target", metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan.")
+@click.option(
+    "-o", "--out", "target", type=Output(), metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan."
+)
 @vendors_option
 @json_option
 def command(
