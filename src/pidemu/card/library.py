@@ -146,6 +146,11 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     return kept[1]
 
 
+def loaded_files() -> list[Path]:
+    """Return the files of the cards that were read, be they right or wrong; none of them is to be written."""
+    return [file for file, _ in _loaded]
+
+
 def not_an_id(name: str) -> str | None:
     """Return what is wrong with a card that is named as a file, where files of others name cards; ``None`` for what may be an id.
 

@@ -10,6 +10,7 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import Output, action_option, assignments, echo, limits_option, vendors_option
+from pidemu.cli.outputs import inputs
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
@@ -100,6 +101,6 @@ def _write(path: Path, text: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise PidemuError(f"{visible(str(path))}: cannot be written: {reason(error)}") from None
-    with beside(path, PidemuError) as stream:
+    with beside(path, PidemuError, inputs()) as stream:
         stream.write(text)
     echo(str(path))

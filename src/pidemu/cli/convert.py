@@ -25,11 +25,12 @@ from pidemu.cli.common import (
     split_options,
     vendors_option,
 )
+from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import DIGITS
-from pidemu.errors import ActionError, ConversionRefusedError, QuestionError, SettingError
+from pidemu.errors import ActionError, ConversionRefusedError, PidemuError, QuestionError, SettingError
 from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 
@@ -209,6 +210,7 @@ def command(
         source = _only_reading(word, {**given, **ranges}, goal, arguments, target, vendors, as_json)
     else:
         source = load_card(card or "", vendors).settings({**given, **ranges})
+    check_outputs({"--html": page}, PidemuError, inputs(loop_file))  # now, and not after the work
     conversion = _converted(source, goal, arguments, as_json)
     plan, not_known = _plan(conversion, now)
     if page is not None:

@@ -26,6 +26,7 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
+from pidemu.cli.outputs import inputs
 from pidemu.errors import FleetError
 from pidemu.excerpt import quoted
 from pidemu.files.writing import check
@@ -108,7 +109,7 @@ def command(
         echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
     for path in (target, parquet):
         if path is not None:  # now, and not after the work
-            check(path, FleetError, [file])
+            check(path, FleetError, inputs(file))
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(

@@ -10,9 +10,11 @@ from typing import Final
 
 import click
 
+from pidemu.card.library import card_files
 from pidemu.cli.common import Output, echo, heading, json_option, print_json, table, vendors_option, wrapped
+from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import beside
 from pidemu.matrix.cell import OUTCOMES, Cell
 from pidemu.matrix.matrix import Matrix, counts, matrix
 
@@ -56,15 +58,14 @@ def command(
         from pidemu.report.matrix_page import check_page
 
         check_page()
-    for path in (text, page):
-        if path is not None:  # now, and not after the work
-            check(path, PidemuError)
+    read = card_files(vendors).values()
+    check_outputs({"--csv": text, "--html": page}, PidemuError, read)  # now, and not after the work
     with _shown_progress() as progress:
         found = matrix(
             cards or None, derivative=not plain, emulate=not laws, jobs=jobs, vendors=vendors, progress=progress
         )  # fmt: skip
     if text is not None:
-        with beside(text, PidemuError) as stream:
+        with beside(text, PidemuError, read) as stream:
             stream.write(found.to_csv())
     if page is not None:
         from pidemu.report.matrix_page import write_page

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pidemu.card.library import folders, load_card_by_id
+from pidemu.card.library import folders, load_card_by_id, loaded_files
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
@@ -105,9 +105,9 @@ class LoopTable:
         Raises
         ------
         FleetError
-            The file cannot be written, or is the file of loops.
+            The file cannot be written, is the file of loops, or that of a card.
         """
-        write_table(path, HEADER, self.rows(result), FleetError, inputs=[self.path])
+        write_table(path, HEADER, self.rows(result), FleetError, inputs=[self.path, *loaded_files()])
 
 
 def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
