@@ -132,13 +132,24 @@ def _bytes(path: str | Path, name: str, error: type[PidemuError], kind: Kind) ->
             _refuse(error, name, "cannot be read: it is a folder")
         if not (stat.S_ISREG(mode) or (kind.pipes and stat.S_ISFIFO(mode))):
             _refuse(error, name, "cannot be read: it is a device or a pipe, and not a file")
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_open) as file:
             data = file.read(kind.limit + 1)
     except (OSError, ValueError) as fault:
         _refuse(error, name, f"cannot be read: {reason(fault)}")
+    if not data and stat.S_ISFIFO(mode):
+        _refuse(error, name, "cannot be read: a pipe to which nothing is written; start what writes to it first, or give a file")
     if len(data) > kind.limit:
         _refuse(error, name, f"larger than {kind.limit / 2**20:g} MB, which is too much for {kind.name}; {kind.remedy}")
     return data
+
+
+def _open(path: str, flags: int) -> int:
+    """Open a file without waiting for somebody to write to it, should it be a pipe; what is read is waited for as ever."""
+    if not hasattr(os, "O_NONBLOCK"):
+        return os.open(path, flags)
+    number = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(number, True)
+    return number
 
 
 def _normal(text: str) -> str:
