@@ -261,3 +261,18 @@ def test_a_list_names_cards_by_id_and_no_file_is_looked_for(tmp_path: Path, monk
         assert reason(tmp_path, f'FIC-2,{name},GAIN=2; RESET=4,"gain=1,lag=10",,,,,,') == expected
     (loop,) = read_loops(tmp_path / "loops.csv", [tmp_path / "evil"]).loops
     assert loop.settings.card.id == "generic/standard"
+
+
+def test_a_byte_that_is_not_utf_8_costs_its_row(tmp_path: Path) -> None:
+    bad = GOOD.replace("FIC-1", "Störung").encode("latin-1")
+    (tmp_path / "loops.csv").write_bytes(b"\n".join([HEAD.encode(), GOOD.encode(), bad, GOOD.replace("FIC-1", "Kühler").encode()]))
+    table = read_loops(tmp_path / "loops.csv")
+    assert [loop.tag for loop in table.loops] == ["FIC-1", "Kühler"]
+    (wrong,) = table.wrong
+    assert (wrong.line, wrong.reason) == (3, "column 3: not UTF-8 text (byte 0xF6); save the file as UTF-8")
+
+
+def test_a_byte_that_is_not_utf_8_in_the_header_is_said_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "loops.csv").write_bytes(HEAD.encode() + b",\xf6\n" + GOOD.encode())
+    with pytest.raises(FleetError, match=r":1: column \d+: not UTF-8 text \(byte 0xF6\); save the file as UTF-8$"):
+        read_loops(tmp_path / "loops.csv")

@@ -168,8 +168,8 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
 
 
 def _lines(path: str | Path) -> Lines:
-    """Return the lines of a file; a control character costs its row only."""
-    lines = split_lines(read_text(path, FleetError, _KIND, controls=False), empty=" \t,;")
+    """Return the lines of a file; a control character, or a byte that is not UTF-8, costs its row only."""
+    lines = split_lines(read_text(path, FleetError, _KIND, by_line=True), empty=" \t,;")
     if len(lines.rows) < 2:
         wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
         raise FleetError(f"{visible(str(path))}: no loops; {wanted}")
