@@ -181,8 +181,8 @@ def test_a_file_without_loops_or_that_is_no_text_is_refused(tmp_path: Path) -> N
     path = tmp_path / "loops.csv"
     with pytest.raises(FleetError, match="no loops; the file has a header line such as tag,card,settings,process and one"):
         read(tmp_path)
-    path.write_bytes("tag,card,settings,process\nKühler,a/b,,gain=1\n".encode("latin-1"))
-    with pytest.raises(FleetError, match=r":2:2: not UTF-8 text \(byte 0xFC\); save the file as UTF-8"):
+    path.write_text("tag,card,settings,process\nA,a/b,,gain=1\n", encoding="utf-16")
+    with pytest.raises(FleetError, match="text in UTF-16, little-endian; save the file as UTF-8"):
         read_loops(path)
     with pytest.raises(FleetError, match="cannot be read: No such file or directory"):
         read_loops(tmp_path / "none.csv")
@@ -276,3 +276,15 @@ def test_a_byte_that_is_not_utf_8_in_the_header_is_said_with_its_place(tmp_path:
     (tmp_path / "loops.csv").write_bytes(HEAD.encode() + b",\xf6\n" + GOOD.encode())
     with pytest.raises(FleetError, match=r":1: column \d+: not UTF-8 text \(byte 0xF6\); save the file as UTF-8$"):
         read_loops(tmp_path / "loops.csv")
+
+
+@pytest.mark.parametrize("settings", ["K=2, Ti=10", "K=2 Ti=10", "K=2,Ti=10"])
+def test_settings_that_are_not_separated_by_semicolons_are_told_so(settings: str, tmp_path: Path) -> None:
+    expected = f"'{settings}' is more than one setting; separate them by semicolons, such as GAIN=2; RESET=20"
+    assert reason(tmp_path, GOOD.replace("FIC-1", "FIC-2").replace("K=2; Ti=10", f'"{settings}"')) == expected
+
+
+@pytest.mark.parametrize("process", ["gain=1;lag=10", "gain=1 lag=10"])
+def test_parts_of_a_process_that_are_not_separated_by_commas_are_told_so(process: str, tmp_path: Path) -> None:
+    expected = f"'{process}' is more than one part; separate them by commas, such as gain=1.5,lag=10,delay=3"
+    assert reason(tmp_path, GOOD.replace("FIC-1", "FIC-2").replace("gain=1,lag=10,delay=2", process)) == expected

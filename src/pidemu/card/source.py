@@ -1,7 +1,7 @@
 """YAML text to plain values, each with its place in the file.
 
-YAML 1.2 core scalars (``1e-3`` is a number, ``off`` and ``no`` are words), no duplicate keys, no anchors, no aliases, no tags. Whatever
-the text, the answer is a document or a list of located problems.
+YAML 1.2 core scalars (``1e-3`` is a number, ``off`` and ``no`` are words), no duplicate keys, no anchors, no aliases, no tags.
+Whatever the text, the answer is a document or a list of located problems.
 """
 
 from __future__ import annotations

@@ -210,7 +210,8 @@ def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequ
     first = seen.setdefault(row["tag"], line)
     if first != line:
         raise FleetError(f"line {first} has this tag already; give each loop its own")
-    given = assignments(word for word in row.get("settings", "").split(";") if word.strip())
+    words = (word for word in row.get("settings", "").split(";") if word.strip())
+    given = assignments(words, such="GAIN=2; RESET=20 s/repeat", between="semicolons, such as GAIN=2; RESET=20")
     readers = {"scan": seconds, "time": seconds, "setpoint": step, "load": step, "limits": pair, "action": _action}
     found: dict[str, Any] = {}
     for name, read in readers.items():
