@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Final
 
 from pidemu.errors import SettingError, UnitError
 from pidemu.excerpt import quoted
@@ -13,15 +14,24 @@ from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
 
-def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAIN=2 or "RESET=20 s/repeat"') -> dict[str, Any]:
-    """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages.
+_SEVERAL: Final = re.compile(r"[\s,;]\w+\s*=")
+"""A value that another ``NAME=`` follows."""
+
+
+def assignments(
+    words: Iterable[str],
+    what: str = "NAME=VALUE",
+    such: str = 'GAIN=2 or "RESET=20 s/repeat"',
+    between: str = "blanks, such as GAIN=2 RESET=20",
+) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` words; `what` and `such` describe them in messages, and `between` what stands between them.
 
     A signal range, such as ``pv_range=0,400 degC``, is read; every other value stays a text.
 
     Raises
     ------
     SettingError
-        A word has no ``=``, a name comes twice, or a signal range is not one.
+        A word has no ``=``, or several, a name comes twice, or a signal range is not one.
     """
     found: dict[str, Any] = {}
     for word in words:
@@ -29,6 +39,8 @@ def assignments(words: Iterable[str], what: str = "NAME=VALUE", such: str = 'GAI
         name = name.strip()
         if not equals or not name or not value.strip():
             raise SettingError(f"'{word}' is not {what}; write for example {such}")
+        if _SEVERAL.search(value):
+            raise SettingError(f"'{quoted(word.strip(), 200)}' is more than one setting; separate them by {between}")
         first = next((n for n in found if n.casefold() == name.casefold()), None)
         if first is not None:
             raise SettingError(f"{name} is given twice, {found[first]} and {value.strip()}; give it once")

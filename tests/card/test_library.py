@@ -158,3 +158,9 @@ def test_files_that_are_no_cards_are_not_listed(tmp_path: Path) -> None:
     (tmp_path / "nobody" / "old").mkdir()
     (tmp_path / "nobody" / "old" / "bench.yaml").write_text(VALID, encoding="utf-8")
     assert [i for i in cards([tmp_path]) if i not in cards()] == ["nobody/bench"]
+
+
+@pytest.mark.parametrize("name", ["C:/x", "x/C:", "../x", "x/..", "./x", "a\\b/x", "//x"])
+def test_an_id_leads_to_no_other_drive_or_folder(name: str) -> None:
+    with pytest.raises(CardNotFoundError, match="no card"):
+        load_card(name)

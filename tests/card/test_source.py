@@ -103,7 +103,24 @@ def test_a_duplicate_in_a_nested_mapping_is_refused() -> None:
 
 
 def test_aliases_are_refused() -> None:
-    assert placed("card: 1\na: &one 1\nb: *one\n") == [(3, 4, "alias '*one' is not used in cards; write the value out")]
+    assert placed("card: 1\nb: *one\n") == [(2, 4, "alias '*one' is not used in cards; write the value out")]
+
+
+@pytest.mark.parametrize("text", ["card: 1\na: &one 1\n", "card: 1\na: &one [1]\n", "card: 1\na: &one {b: 1}\n"])
+def test_anchors_are_refused(text: str) -> None:
+    assert placed(text) == [(2, 4, "anchor '&one' is not used in cards; remove it")]
+
+
+def test_the_anchor_of_a_key_is_refused() -> None:
+    assert placed("card: 1\n&one a: 1\n") == [(2, 1, "anchor '&one' is not used in cards; remove it")]
+
+
+def test_directives_of_another_yaml_are_refused() -> None:
+    assert parse("%YAML 1.2\n---\ncard: 1\n", "x.yaml").value == {"card": 1}
+    assert [message for *_, message in placed("%YAML 1.1\n---\ncard: 1\n")] == ["cards are YAML 1.2; remove the line %YAML"]
+    assert [message for *_, message in placed("%TAG ! tag:x,2000:\n---\ncard: 1\n")] == [
+        "tags are not used in cards; remove the line %TAG"
+    ]
 
 
 @pytest.mark.parametrize("tag", ["!!python/object/apply:os.system", "!include", "!!float"])

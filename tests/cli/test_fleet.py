@@ -320,7 +320,7 @@ def test_a_damaged_cache_is_no_matter_to_a_fleet(damage: str, folder: Path) -> N
 
 
 def test_a_card_with_a_name_longer_than_that_of_any_file_costs_its_row(folder: Path) -> None:
-    cards = ("generic/" + "x" * 300, "y" * 5000 + ".yaml")
+    cards = ("generic/" + "x" * 300, "generic/" + "y" * 5000)
     lines = [FAST.replace("FIC-1", f"LONG-{i}").replace("generic/standard", card) for i, card in enumerate(cards)]
     (folder / "names.csv").write_text(HEAD + FAST + "".join(lines), encoding="utf-8")
     status, out, err = said("fleet", "names.csv")

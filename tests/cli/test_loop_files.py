@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.cli.helpers import told
+from tests.cli.helpers import said, told
 
 LOOP = """\
 card: yokogawa/fieldbus-pid
@@ -58,3 +58,11 @@ action: reverse
 """
     out = told("convert", "--loop", written(tmp_path, loop))
     assert "Output limits: set 20 to 80 %." in out
+
+
+def test_cards_stand_there_by_id_and_no_file_is_looked_for(tmp_path: Path) -> None:
+    loop = "card: evil/fisher/provox.yaml\nsettings: {GAIN: 2}\nto: /etc/other.yml\n"
+    status, out, err = said("convert", "--loop", written(tmp_path, loop))
+    assert (status, out) == (1, "")
+    assert "loop.yaml:1:7: 'evil/fisher/provox.yaml' is a file, not the id of a card; name its folder with --vendors" in err
+    assert "loop.yaml:3:5: '/etc/other.yml' is a file, not the id of a card; name its folder with --vendors" in err

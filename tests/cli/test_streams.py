@@ -170,7 +170,7 @@ def test_a_loop_file_that_is_an_l5x_is_called_so(folder: Path, name: str) -> Non
     [
         ("", "the file is empty; a loop file is YAML text that states card: and settings:"),
         ("- 1\n", "the file is not a mapping; a loop file is YAML text that states card: and settings:"),
-        ("card: !x y\n", "tag '!x' is not used in loop files; remove it"),
+        ("card: a/b\nto: !x y\n", "tag '!x' is not used in loop files; remove it"),
         ("card: a/b\n---\ncard: a/b\n", "a second document; a loop file is one document, put it in a file of its own"),
     ],
 )

@@ -302,3 +302,9 @@ def test_a_wrong_loop_file_is_refused_at_its_place_with_status_1(text: str, head
     assert [f"loop.yaml:{h}" for h in headlines] == [
         line.removeprefix("error: ") for line in err.splitlines() if "loop.yaml:" in line
     ]
+
+
+def test_settings_that_are_one_word_are_told_how_to_be_separated() -> None:
+    status, out, err = said("show", "fisher/provox", "GAIN=2,RESET=4")
+    expected = "error: 'GAIN=2,RESET=4' is more than one setting; separate them by blanks, such as GAIN=2 RESET=20\n"
+    assert (status, out, err) == (2, "", expected)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -132,3 +134,48 @@ def test_a_card_error_has_a_problem_with_its_place(tmp_path: Path) -> None:
         read_text(tmp_path / "x.yaml", CardError, KIND, shown="x.yaml")
     (problem,) = caught.value.problems
     assert (problem.path, problem.line, problem.column, problem.source) == ("x.yaml", 2, 1, ())
+
+
+NOBODY = "cannot be read: a pipe to which nothing is written; start what writes to it first, or give a file"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes with names")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("convert", "--loop", "pipe"),
+        ("run", "fisher/provox", "GAIN=2", "RESET=4", "--record", "pipe"),
+        ("fleet", "pipe"),
+        ("verify", "pipe"),
+    ],
+)
+def test_a_pipe_without_a_writer_is_not_waited_for(words: tuple[str, ...], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    run = subprocess.run(
+        [sys.executable, "-m", "pidemu", *words], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (run.stdout, run.returncode) == ("", 1 if "--loop" in words else 2)
+    assert run.stderr.endswith(f"{NOBODY}\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes with names")
+def test_a_pipe_with_a_slow_writer_is_read_to_its_end(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    writer = subprocess.Popen(["sh", "-c", "exec > pipe; sleep 0.3; echo sp,pv; sleep 0.3; echo 1,2"], cwd=tmp_path)
+    while True:  # as long as the shell has not opened it
+        try:
+            text = read_text(tmp_path / "pipe", RecordError, KIND)
+        except RecordError:
+            continue
+        break
+    assert (text, writer.wait(10)) == ("sp,pv\n1,2\n", 0)
+
+
+@pytest.mark.skipif(not Path("/dev/stdin").exists(), reason="/dev/stdin")
+def test_the_standard_input_is_waited_for() -> None:
+    program = (
+        "from pidemu.errors import RecordError; from pidemu.files.reading import Kind, read_text\n"
+        "print(read_text('/dev/stdin', RecordError, Kind('a record', '')))"
+    )
+    line = f"(sleep 0.3; echo sp,pv; sleep 0.3; echo 1,2) | '{sys.executable}' -c \"{program}\""
+    assert subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=True, timeout=60).stdout == "sp,pv\n1,2\n\n"

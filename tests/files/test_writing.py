@@ -211,3 +211,14 @@ def test_a_name_that_is_not_utf_8_and_a_long_one_are_written(tmp_path: Path) -> 
 def test_half_a_pair_in_a_text_is_written_as_an_escape(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", "K\udcfchler")
     assert (tmp_path / "a.csv").read_text() == "K\\udcfchler"
+
+
+@pytest.mark.parametrize("name", ["", "none/.."])
+def test_no_name_and_the_folder_itself_are_refused_and_nothing_lands_outside(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    expected = "none/..: cannot be written: it is a folder" if name else "no name of a file to write; give a file name"
+    assert message(name) == expected
+    assert (names(tmp_path), names(tmp_path / "here")) == (["here"], [])

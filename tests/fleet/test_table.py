@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import pidemu
+from pidemu.card.library import builtin_folder
 from pidemu.errors import CardNotFoundError, FleetError
 from pidemu.fleet import table
 from pidemu.fleet.result import HEADER
@@ -180,8 +181,8 @@ def test_a_file_without_loops_or_that_is_no_text_is_refused(tmp_path: Path) -> N
     path = tmp_path / "loops.csv"
     with pytest.raises(FleetError, match="no loops; the file has a header line such as tag,card,settings,process and one"):
         read(tmp_path)
-    path.write_bytes("tag,card,settings,process\nKühler,a/b,,gain=1\n".encode("latin-1"))
-    with pytest.raises(FleetError, match=r":2:2: not UTF-8 text \(byte 0xFC\); save the file as UTF-8"):
+    path.write_text("tag,card,settings,process\nA,a/b,,gain=1\n", encoding="utf-16")
+    with pytest.raises(FleetError, match="text in UTF-16, little-endian; save the file as UTF-8"):
         read_loops(path)
     with pytest.raises(FleetError, match="cannot be read: No such file or directory"):
         read_loops(tmp_path / "none.csv")
@@ -240,7 +241,7 @@ def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, 
             raise error
         return real(name, *rest)
 
-    monkeypatch.setattr(table, "load_card", load_card)
+    monkeypatch.setattr(table, "load_card_by_id", load_card)
     path = tmp_path / "loops.csv"
     rows = ('A,generic/standard,K=1; Ti=10,"gain=1,lag=9"', 'B,emerson/deltav,GAIN=1,"gain=1,lag=9"')
     path.write_text("tag,card,settings,process\n" + "\n".join(rows) + "\n", encoding="utf-8")
@@ -248,3 +249,42 @@ def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, 
     assert [loop.tag for loop in found.loops] == ["A"]
     assert [(row.tag, row.line) for row in found.wrong] == [("B", 3)]
     assert found.wrong[0].reason.startswith(f"internal error of this loop ({type(error).__name__}: {error})")
+
+
+def test_a_list_names_cards_by_id_and_no_file_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    evil = tmp_path / "evil" / "fisher" / "provox.yaml"
+    evil.parent.mkdir(parents=True)
+    evil.write_bytes((builtin_folder() / "fisher" / "provox.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    for name in ("evil/fisher/provox.yaml", str(evil), "not/there.yml", "//host/share/provox.yaml"):
+        expected = f"'{name}' is a file, not the id of a card; name its folder with --vendors"
+        assert reason(tmp_path, f'FIC-2,{name},GAIN=2; RESET=4,"gain=1,lag=10",,,,,,') == expected
+    (loop,) = read_loops(tmp_path / "loops.csv", [tmp_path / "evil"]).loops
+    assert loop.settings.card.id == "generic/standard"
+
+
+def test_a_byte_that_is_not_utf_8_costs_its_row(tmp_path: Path) -> None:
+    bad = GOOD.replace("FIC-1", "Störung").encode("latin-1")
+    (tmp_path / "loops.csv").write_bytes(b"\n".join([HEAD.encode(), GOOD.encode(), bad, GOOD.replace("FIC-1", "Kühler").encode()]))
+    table = read_loops(tmp_path / "loops.csv")
+    assert [loop.tag for loop in table.loops] == ["FIC-1", "Kühler"]
+    (wrong,) = table.wrong
+    assert (wrong.line, wrong.reason) == (3, "column 3: not UTF-8 text (byte 0xF6); save the file as UTF-8")
+
+
+def test_a_byte_that_is_not_utf_8_in_the_header_is_said_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "loops.csv").write_bytes(HEAD.encode() + b",\xf6\n" + GOOD.encode())
+    with pytest.raises(FleetError, match=r":1: column \d+: not UTF-8 text \(byte 0xF6\); save the file as UTF-8$"):
+        read_loops(tmp_path / "loops.csv")
+
+
+@pytest.mark.parametrize("settings", ["K=2, Ti=10", "K=2 Ti=10", "K=2,Ti=10"])
+def test_settings_that_are_not_separated_by_semicolons_are_told_so(settings: str, tmp_path: Path) -> None:
+    expected = f"'{settings}' is more than one setting; separate them by semicolons, such as GAIN=2; RESET=20"
+    assert reason(tmp_path, GOOD.replace("FIC-1", "FIC-2").replace("K=2; Ti=10", f'"{settings}"')) == expected
+
+
+@pytest.mark.parametrize("process", ["gain=1;lag=10", "gain=1 lag=10"])
+def test_parts_of_a_process_that_are_not_separated_by_commas_are_told_so(process: str, tmp_path: Path) -> None:
+    expected = f"'{process}' is more than one part; separate them by commas, such as gain=1.5,lag=10,delay=3"
+    assert reason(tmp_path, GOOD.replace("FIC-1", "FIC-2").replace("gain=1,lag=10,delay=2", process)) == expected

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 from pidemu.card.load import Card, load_file, wrong_id
 from pidemu.errors import CardError, CardNotFoundError, Problem, suggest
@@ -13,6 +13,8 @@ from pidemu.excerpt import shortened, visible
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
+
+_ENDINGS = (".yaml", ".yml")
 
 _loaded: dict[tuple[Path, str | None], tuple[int, Card | CardError]] = {}
 """Cards read so far, or what is wrong with them, by file and id, with the time the file was changed."""
@@ -125,7 +127,7 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
         The card is wrong: every fault with its file, line and column.
     """
     name = name.as_posix() if isinstance(name, Path) else name
-    file = Path(name) if name.endswith((".yaml", ".yml")) else None
+    file = Path(name) if name.endswith(_ENDINGS) else None
     card_id = name if file is None else None
     if file is None:
         named = [d / f"{name}.yaml" for d in folders(vendors)] if _is_id(name) else []
@@ -144,9 +146,40 @@ def load_card(name: str | Path, vendors: Sequence[str | Path] = ()) -> Card:
     return kept[1]
 
 
+def loaded_files() -> list[Path]:
+    """Return the files of the cards that were read, be they right or wrong; none of them is to be written."""
+    return [file for file, _ in _loaded]
+
+
+def not_an_id(name: str) -> str | None:
+    """Return what is wrong with a card that is named as a file, where files of others name cards; ``None`` for what may be an id.
+
+    Who writes a list of loops or a loop file shall neither choose which files are opened nor learn which there are.
+    """
+    if not name.endswith(_ENDINGS):
+        return None
+    return f"'{shortened(visible(name), 200)}' is a file, not the id of a card; name its folder with --vendors"
+
+
+def load_card_by_id(card_id: str, vendors: Sequence[str | Path] = ()) -> Card:
+    """Return a card as `load_card` does, by its id alone.
+
+    Raises
+    ------
+    CardNotFoundError
+        There is no such card, or a file is named.
+    CardError
+        The card is wrong.
+    """
+    wrong = not_an_id(card_id)
+    if wrong is not None:
+        raise CardNotFoundError(wrong)
+    return load_card(card_id, vendors)
+
+
 def _not_found(name: str, vendors: Sequence[str | Path]) -> CardNotFoundError:
     shown = shortened(visible(name), 200)
-    if name.endswith((".yaml", ".yml")):
+    if name.endswith(_ENDINGS):
         return CardNotFoundError(f"no file '{shown}'")
     known = cards(vendors)
     hint = suggest(name, known) or _suggest_block(name, known)
@@ -182,4 +215,4 @@ def _suggest_block(name: str, known: list[str]) -> str:
 
 def _is_id(name: str) -> bool:
     parts = name.split("/")
-    return len(parts) == 2 and all(p not in ("", ".", "..") and "\\" not in p for p in parts)
+    return len(parts) == 2 and all(p != ".." and PureWindowsPath(p).name == p for p in parts)  # no drive

@@ -1,7 +1,7 @@
 """YAML text to plain values, each with its place in the file.
 
-YAML 1.2 core scalars (``1e-3`` is a number, ``off`` and ``no`` are words), no duplicate keys, no aliases, no tags. Whatever
-the text, the answer is a document or a list of located problems.
+YAML 1.2 core scalars (``1e-3`` is a number, ``off`` and ``no`` are words), no duplicate keys, no anchors, no aliases, no tags.
+Whatever the text, the answer is a document or a list of located problems.
 """
 
 from __future__ import annotations
@@ -154,12 +154,25 @@ class _Reader:
                 event.start_mark, f"character U+{ord(found):04X} is not allowed in {where}; remove it", self.place(event).width
             )
 
+    def refuse_anchor(self, event: Any) -> None:
+        if event.anchor is not None and not isinstance(event, yaml.AliasEvent):
+            anchor = self.named("anchor", f"&{event.anchor}")
+            self.fail(event.start_mark, f"{anchor} is not used in {self.kind}s; remove it")
+
+    def refuse_directives(self, event: Any) -> None:
+        """Refuse another version of YAML, in which the same words are other values, and short forms of tags."""
+        if event.version not in (None, (1, 2)):
+            self.fail(event.start_mark, f"{self.kind}s are YAML 1.2; remove the line %YAML")
+        if event.tags:
+            self.fail(event.start_mark, f"tags are not used in {self.kind}s; remove the line %TAG")
+
     def read(self, event: Any, path: Path_) -> Any:
         self.count(event)
         self.document.values[path] = self.place(event)
         tag = getattr(event, "tag", None)
         if tag not in (None, "!"):
             self.fail(event.start_mark, f"{self.named('tag', tag)} is not used in {self.kind}s; remove it")
+        self.refuse_anchor(event)
         if isinstance(event, yaml.AliasEvent):
             alias = self.named("alias", f"*{event.anchor}")
             self.fail(event.start_mark, f"{alias} is not used in {self.kind}s; write the value out")
@@ -199,6 +212,7 @@ class _Reader:
     def key(self, event: Any) -> str:
         name: str = event.value
         self.count(event)
+        self.refuse_anchor(event)
         self.refuse_hidden(event, "")
         if name != name.strip():
             self.fail(event.start_mark, "a key has blanks around it; remove them", self.place(event).width)
@@ -237,6 +251,8 @@ def parse(text: str, path: str, kind: Kind = CARD) -> Document:
         reader.events = iter(yaml.parse(text, Loader=_Loader))
         roots = 0
         for event in reader.events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                reader.refuse_directives(event)
             if isinstance(event, yaml.NodeEvent):
                 roots += 1
                 if roots > 1:

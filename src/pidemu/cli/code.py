@@ -9,7 +9,8 @@ from pathlib import Path
 import click
 
 from pidemu.card.library import load_card
-from pidemu.cli.common import action_option, assignments, echo, limits_option, vendors_option
+from pidemu.cli.common import Output, action_option, assignments, echo, limits_option, vendors_option
+from pidemu.cli.outputs import inputs
 from pidemu.emulator import Controller
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
@@ -25,7 +26,7 @@ from pidemu.unverified import facts, unverified_program
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
 @click.option("--name", metavar="NAME", help="The name of files, types and functions; by default the card's.")
-@click.option("--out", type=click.Path(file_okay=False), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
+@click.option("--out", type=Output("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option
 @limits_option
@@ -100,6 +101,6 @@ def _write(path: Path, text: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise PidemuError(f"{visible(str(path))}: cannot be written: {reason(error)}") from None
-    with beside(path, PidemuError) as stream:
+    with beside(path, PidemuError, inputs()) as stream:
         stream.write(text)
     echo(str(path))

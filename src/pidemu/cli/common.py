@@ -24,12 +24,13 @@ from pidemu.words import assignments as assignments  # noqa: PLC0414
 from pidemu.words import pair, seconds, step
 
 if TYPE_CHECKING:
+    _NameType = click.ParamType[str]
     _PairType = click.ParamType[tuple[float, float]]
     _RangeType = click.ParamType[SignalRange]
     _TimeType = click.ParamType[float]
     _StepType = click.ParamType[float | tuple[float, float]]
 else:
-    _PairType = _RangeType = _TimeType = _StepType = click.ParamType  # it has no type parameter before click 8.4
+    _NameType = _PairType = _RangeType = _TimeType = _StepType = click.ParamType  # it has no type parameter before click 8.4
 
 vendors_option = click.option(
     "--vendors",
@@ -42,6 +43,19 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, 
 
 _CELL: Final = 200
 """Characters of a cell of a table on the screen: one that is longer would widen every row."""
+
+
+class Output(_NameType):
+    """The name of a file or folder that is written."""
+
+    def __init__(self, kind: str = "file") -> None:
+        self.name = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse an empty name, which would lead to the folder that the command stands in."""
+        if not str(value).strip():
+            self.fail(f"give a {self.name} name", param, ctx)
+        return str(value)
 
 
 class Pair(_PairType):

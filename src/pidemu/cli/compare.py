@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
+    Output,
     action_option,
     assignments,
     echo,
@@ -22,10 +24,11 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.happened import moved
+from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.comparison.compare import Comparison, compare
 from pidemu.comparison.side_by_side import dials
 from pidemu.errors import RecordError
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import beside
 from pidemu.record.files import SIGNALS, Record, write_record
 from pidemu.record.playback import NO_BUMP
 from pidemu.record.standard import StandardRecord
@@ -69,8 +72,12 @@ class Scans(_ScansType):
     type=float,
     help="Output before the first scan; by default the first recorded one, else 0; 50 with the standard record.",
 )
-@click.option("-o", "--output", "target", metavar="FILE.csv", help="Where to write the signals and all outputs, as columns.")
-@click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw the signals, outputs and differences; needs matplotlib.")
+@click.option(
+    "-o", "--output", "target", type=Output(), metavar="FILE.csv", help="Where to write the signals and all outputs, as columns."
+)
+@click.option(
+    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw the signals, outputs and differences; needs matplotlib."
+)
 @vendors_option
 @json_option
 def command(
@@ -96,10 +103,8 @@ def command(
         check_picture(picture)
     named = _split(words)
     settings = [load_card(card, vendors).settings(assignments(values)) for card, values in named]
-    inputs = [*(card for card, _ in named), *([] if file is None else [file])]
-    for path in (target, picture):
-        if path is not None:  # now, and not after the work
-            check(path, RecordError, inputs)
+    read = inputs(file)
+    check_outputs({"--output": target, "--plot": picture}, RecordError, read)  # now, and not after the work
     if scan is not None and len(scan) not in (1, len(settings)):
         raise click.UsageError(f"{len(scan)} scan intervals for {len(settings)} cards; give one for all, or one for each")
     comparison = compare(
@@ -111,7 +116,7 @@ def command(
         initial_output=initial_output,
     )
     if target is not None:
-        _write(comparison, target, inputs)
+        _write(comparison, target, read)
     if as_json:
         print_json(comparison.to_dict())
     else:
@@ -192,7 +197,7 @@ def _table(columns: list[str], rows: list[list[str]]) -> None:
         echo(f"  and {len(rows) - _ROWS} more; --json lists all")
 
 
-def _write(c: Comparison, target: str, inputs: Sequence[str]) -> None:
+def _write(c: Comparison, target: str, read: Sequence[str | Path]) -> None:
     """Write the record as the first card saw it, with all outputs as columns."""
     record: Record = c.record
     columns = {label: values.tolist() for label, values in c.outputs.items()}
@@ -201,5 +206,5 @@ def _write(c: Comparison, target: str, inputs: Sequence[str]) -> None:
         signals = [c.times.tolist(), *(getattr(record, n).tolist() for n in names)]
         rows = tuple(tuple("" if math.isnan(x) else f"{x!r}" for x in row) for row in zip(*signals, strict=True))
         record = Record(record.sp, record.pv, header=("time", *names), rows=rows)
-    with beside(target, RecordError, inputs) as stream:
+    with beside(target, RecordError, read) as stream:
         write_record(record, columns, stream)

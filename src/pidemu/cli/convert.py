@@ -13,6 +13,7 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
 from pidemu.cli.common import (
+    Output,
     Pair,
     Range,
     Scan,
@@ -24,11 +25,12 @@ from pidemu.cli.common import (
     split_options,
     vendors_option,
 )
+from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
 from pidemu.conversion.request import DIGITS
-from pidemu.errors import ActionError, ConversionRefusedError, QuestionError, SettingError
+from pidemu.errors import ActionError, ConversionRefusedError, PidemuError, QuestionError, SettingError
 from pidemu.ranges import SignalRange
 from pidemu.settings import Settings
 
@@ -126,7 +128,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     metavar="YYYY-MM-DD",
     help="Date of the certificate; by default today.",
 )
-@click.option("--html", "page", metavar="FILE.html", help="Write the certificate as a page with plots.")
+@click.option("--html", "page", type=Output(), metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
 def command(
@@ -208,6 +210,7 @@ def command(
         source = _only_reading(word, {**given, **ranges}, goal, arguments, target, vendors, as_json)
     else:
         source = load_card(card or "", vendors).settings({**given, **ranges})
+    check_outputs({"--html": page}, PidemuError, inputs(loop_file))  # now, and not after the work
     conversion = _converted(source, goal, arguments, as_json)
     plan, not_known = _plan(conversion, now)
     if page is not None:

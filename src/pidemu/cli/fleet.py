@@ -13,6 +13,7 @@ import click
 
 from pidemu.cli import interrupts
 from pidemu.cli.common import (
+    Output,
     Time,
     asked_for,
     echo,
@@ -27,6 +28,7 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
+from pidemu.cli.outputs import inputs
 from pidemu.errors import FleetError
 from pidemu.excerpt import quoted
 from pidemu.files.writing import check
@@ -52,9 +54,11 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 @click.option("--margins/--no-margins", default=True, help="Compute margins and stability, which takes about as long as the run.")
 @click.option("--cores", type=click.IntRange(min=1), metavar="N", help="Threads on this machine; by default one per core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: its scheduler's address, such as tcp://HOST:8786.")
-@click.option("--table", "target", metavar="FILE.csv", help="Write the table: a row per loop.")
-@click.option("--signals", metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files.")
-@click.option("--parquet", metavar="FILE", help="Write table and signals as a Parquet file.")
+@click.option("--table", "target", type=Output(), metavar="FILE.csv", help="Write the table: a row per loop.")
+@click.option(
+    "--signals", type=Output("folder"), metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files."
+)
+@click.option("--parquet", type=Output(), metavar="FILE", help="Write table and signals as a Parquet file.")
 @click.option("--resume", is_flag=True, help="Go on with a run that did not end: with what it left in --signals and --parquet.")
 @click.option(
     "--worker-timeout",
@@ -106,15 +110,13 @@ def command(
         echo(f"note: {file}: {loops.skipped}", err=True)
     for wrong in loops.wrong:
         echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
-    if signals == "":
-        raise FleetError("--signals '' names no folder; give one")
     refuse_overlap({"--table": target, "--signals": signals, "--parquet": parquet})
     partly: dict[str, Path] = {}  # where what an interrupted run has done goes
     for path in (target, parquet):
         if path is not None:  # now, and not after the work
-            check(path, FleetError, [file])
+            check(path, FleetError, inputs(file))
             partly[path] = instead_of(path)
-            check(partly[path], FleetError, [file])
+            check(partly[path], FleetError, inputs(file))
     result = None
     if loops.loops:
         result = Fleet(loops.loops).simulate(

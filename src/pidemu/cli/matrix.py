@@ -10,9 +10,11 @@ from typing import Final
 
 import click
 
-from pidemu.cli.common import echo, heading, json_option, print_json, table, vendors_option, wrapped
+from pidemu.card.library import card_files
+from pidemu.cli.common import Output, echo, heading, json_option, print_json, table, vendors_option, wrapped
+from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import beside
 from pidemu.matrix.cell import OUTCOMES, Cell
 from pidemu.matrix.matrix import Matrix, counts, matrix
 
@@ -28,8 +30,10 @@ _ALONE: Final = " Verdicts rest on the continuous laws alone."
 
 @click.command("matrix", short_help="Convert typical settings of every card to every card.")
 @click.argument("cards", nargs=-1, metavar="[CARD]...")
-@click.option("--csv", "text", metavar="FILE.csv", help="Write one line per conversion, with settings, figures and sentence.")
-@click.option("--html", "page", metavar="FILE.html", help="Write a heat map with all details; needs jinja2.")
+@click.option(
+    "--csv", "text", type=Output(), metavar="FILE.csv", help="Write one line per conversion, with settings, figures and sentence."
+)
+@click.option("--html", "page", type=Output(), metavar="FILE.html", help="Write a heat map with all details; needs jinja2.")
 @click.option("--no-derivative", "plain", is_flag=True, help="Typical settings without derivative.")
 @click.option("--no-emulation", "laws", is_flag=True, help="Compare the continuous laws alone, in less time.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes that share the work; by default one per processor.")
@@ -54,15 +58,14 @@ def command(
         from pidemu.report.matrix_page import check_page
 
         check_page()
-    for path in (text, page):
-        if path is not None:  # now, and not after the work
-            check(path, PidemuError)
+    read = card_files(vendors).values()
+    check_outputs({"--csv": text, "--html": page}, PidemuError, read)  # now, and not after the work
     with _shown_progress() as progress:
         found = matrix(
             cards or None, derivative=not plain, emulate=not laws, jobs=jobs, vendors=vendors, progress=progress
         )  # fmt: skip
     if text is not None:
-        with beside(text, PidemuError) as stream:
+        with beside(text, PidemuError, read) as stream:
             stream.write(found.to_csv())
     if page is not None:
         from pidemu.report.matrix_page import write_page

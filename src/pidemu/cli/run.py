@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -11,6 +12,7 @@ import numpy as np
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
+    Output,
     action_option,
     asked_for,
     assignments,
@@ -23,9 +25,10 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.happened import tell
+from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import beside
 from pidemu.plain import json_safe
 from pidemu.plausible import plain_number
 from pidemu.record.files import Floats, Record, read_record, write_record
@@ -64,11 +67,14 @@ from pidemu.scan.build import Action
     "-o",
     "--output",
     "target",
+    type=Output(),
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
 @engine_option
-@click.option("--plot", "picture", metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib.")
+@click.option(
+    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib."
+)
 @vendors_option
 @json_option
 def command(
@@ -99,9 +105,8 @@ def command(
         check_picture(picture)
     settings = load_card(card, vendors).settings(assignments(values))
     record = read_record(file)
-    for path in (target, picture):
-        if path is not None:  # now, and not after the work
-            check(path, RecordError, (file, card))
+    read = inputs(file)
+    check_outputs({"--output": target, "--plot": picture}, RecordError, read)  # now, and not after the work
     when = timing(record, file, scan, settings)
     start = _initial(record) if initial_output is None else initial_output
     kind: Action = "direct" if action == "direct" else "reverse"
@@ -111,7 +116,7 @@ def command(
     playback = play(controller, record, file, when.interval)
     emulated = playback.outputs
     if target is not None or not as_json:
-        _write(record, emulated, target, (file, card))
+        _write(record, emulated, target, read)
     if as_json:
         print_json(_plain(controller, record, playback))
     bounds = limits or settings.equation.output.limits
@@ -183,11 +188,11 @@ def _plain(controller: Controller, record: Record, playback: Playback) -> dict[s
     return safe
 
 
-def _write(record: Record, emulated: Floats, target: str | None, inputs: tuple[str, ...]) -> None:
+def _write(record: Record, emulated: Floats, target: str | None, read: Sequence[str | Path]) -> None:
     if target is None:
         write_record(record, {"emulated": emulated}, sys.stdout)
         return
-    with beside(target, RecordError, inputs) as stream:
+    with beside(target, RecordError, read) as stream:
         write_record(record, {"emulated": emulated}, stream)
 
 

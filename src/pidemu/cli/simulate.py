@@ -12,6 +12,7 @@ from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.certificate.models import LoopFigures
 from pidemu.cli.common import (
+    Output,
     Pair,
     Time,
     asked_for,
@@ -28,9 +29,10 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
+from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.engines import Choice, checked
 from pidemu.errors import RecordError
-from pidemu.files.writing import beside, check
+from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
 from pidemu.loop.outcome import has_settled, margins_of, stability_of
 from pidemu.loop.process import parse_process
@@ -81,7 +83,9 @@ _MARGINS: Final = {
 @click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
 @click.option("--limits", type=Pair(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
 @engine_option
-@click.option("-o", "--out", "target", metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan.")
+@click.option(
+    "-o", "--out", "target", type=Output(), metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan."
+)
 @vendors_option
 @json_option
 def command(
@@ -105,14 +109,14 @@ def command(
     over less than 5 % of its largest value in the last fifth of the run. The margins are those of the sampled loop within limits.
     """
     settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
-    if target is not None:  # now, and not after the work
-        check(target, RecordError, [card])
+    read = inputs()
+    check_outputs({"--out": target}, RecordError, read)  # now, and not after the work
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
     made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
     pv, out, choice = run_trial(made, forced)
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
-        with beside(target, RecordError, [card]) as stream:
+        with beside(target, RecordError, read) as stream:
             write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
     figures = figures_of(made, pv, out)
     margins = margins_of(made)

@@ -12,6 +12,7 @@ from pydantic import Discriminator, Field, Tag, ValidationError
 
 from pidemu.card.base import Model, Number, Text
 from pidemu.card.faults import problems
+from pidemu.card.library import not_an_id
 from pidemu.card.source import parse_file
 from pidemu.errors import CardError, CardNotFoundError
 from pidemu.excerpt import visible
@@ -28,9 +29,9 @@ class LoopFile(Model):
     """Settings of one loop and the card they go to."""
 
     about: Text | None = Field(default=None, description="Where the loop comes from.")
-    card: Text = Field(description="The card of the settings.")
+    card: Text = Field(description="The card of the settings, by its id.")
     settings: dict[Text, str | Number] = Field(description="Settings and options by name.")
-    to: Text | None = Field(default=None, description="The card to convert to.")
+    to: Text | None = Field(default=None, description="The card to convert to, by its id.")
     set_: dict[Text, str | Number] = Field(
         default={}, description="Options of the target, and dials that shall have a value.", alias="set"
     )
@@ -99,6 +100,9 @@ def read_loop(file: Path) -> Loop:
         loop = LoopFile.model_validate(document.value)
     except ValidationError as error:
         raise CardError(sorted(problems(error, document.value, LoopFile, document, lambda p: p))) from None
+    faults = {key: not_an_id(name) for key, name in (("card", loop.card), ("to", loop.to)) if name is not None}
+    if any(faults.values()):
+        raise CardError([document.problem((key,), fault) for key, fault in faults.items() if fault is not None])
     ranges = (loop.to_pv_range, loop.to_op_range)
     given = {
         "mode": loop.mode,

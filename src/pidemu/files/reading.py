@@ -17,6 +17,9 @@ from pidemu.files.kinds import other_encoding, other_kind
 _BOM: Final = "\ufeff"
 _CONTROL: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 """What no text holds: control characters but tab and line feed, other ends of lines, a byte order mark, what is no character."""
+_CONTROL_OR_BYTE: Final = re.compile(_CONTROL.pattern[:-1] + "\udc80-\udcff]")
+"""The same, and bytes that are not UTF-8, as they are decoded."""
+_NOT_UTF_8: Final = "not UTF-8 text (byte 0x{:02X}); save the file as UTF-8"
 _NAMES: Final[Mapping[str, str]] = {
     "\x00": "NUL",
     "\x0b": "a vertical tab",
@@ -53,7 +56,15 @@ class Kind:
     pipes: bool = True
 
 
-def read_text(path: str | Path, error: type[PidemuError], kind: Kind, *, shown: str | None = None, controls: bool = True) -> str:
+def read_text(
+    path: str | Path,
+    error: type[PidemuError],
+    kind: Kind,
+    *,
+    shown: str | None = None,
+    controls: bool = True,
+    by_line: bool = False,
+) -> str:
     r"""Return the text of a file, whose lines end in ``\n`` alone.
 
     Parameters
@@ -67,7 +78,10 @@ def read_text(path: str | Path, error: type[PidemuError], kind: Kind, *, shown: 
     shown : str, optional
         Its name in messages; by default `path`.
     controls : bool
-        Whether control characters are refused here; without, `control` finds them line by line.
+        Whether control characters are refused here.
+    by_line : bool
+        Whether what is wrong costs a line only: neither control characters nor bytes that are not UTF-8 are refused here, and
+        `control` finds them in their line.
 
     Raises
     ------
@@ -84,28 +98,32 @@ def read_text(path: str | Path, error: type[PidemuError], kind: Kind, *, shown: 
     if encoding is not None:
         _refuse(error, name, f"text in {encoding}; save the file as UTF-8")
     try:
-        text = data.decode("utf-8").removeprefix(_BOM)
+        text = data.decode("utf-8", "surrogateescape" if by_line else "strict").removeprefix(_BOM)
     except UnicodeDecodeError as fault:
         before = _normal(data[: fault.start].decode("utf-8"))
         byte = data[fault.start]
-        _refuse(error, name, f"not UTF-8 text (byte 0x{byte:02X}); save the file as UTF-8", *_place(before, len(before)))
+        _refuse(error, name, _NOT_UTF_8.format(byte), *_place(before, len(before)))
     text = _normal(text)
-    found = _CONTROL.search(text) if controls else None
+    found = _CONTROL.search(text) if controls and not by_line else None
     if found is not None:
         _refuse(error, name, _control_message(found[0]), *_place(text, found.start()))
     return text
 
 
 def control(line: str) -> str | None:
-    """Return where a control character stands in a line, and which one; ``None`` where there is none.
+    """Return where a control character, or a byte that is not UTF-8, stands in a line, and which; ``None`` where there is none.
 
     Parameters
     ----------
     line : str
         The line, without its end.
     """
-    found = _CONTROL.search(line)
-    return None if found is None else f"column {found.start() + 1}: {_control_message(found[0])}"
+    found = _CONTROL_OR_BYTE.search(line)
+    if found is None:
+        return None
+    byte = ord(found[0]) - 0xDC00
+    what = _NOT_UTF_8.format(byte) if 0x80 <= byte <= 0xFF else _control_message(found[0])
+    return f"column {found.start() + 1}: {what}"
 
 
 def is_file(path: str | Path) -> bool:
@@ -132,13 +150,24 @@ def _bytes(path: str | Path, name: str, error: type[PidemuError], kind: Kind) ->
             _refuse(error, name, "cannot be read: it is a folder")
         if not (stat.S_ISREG(mode) or (kind.pipes and stat.S_ISFIFO(mode))):
             _refuse(error, name, "cannot be read: it is a device or a pipe, and not a file")
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_open) as file:
             data = file.read(kind.limit + 1)
     except (OSError, ValueError) as fault:
         _refuse(error, name, f"cannot be read: {reason(fault)}")
+    if not data and stat.S_ISFIFO(mode):
+        _refuse(error, name, "cannot be read: a pipe to which nothing is written; start what writes to it first, or give a file")
     if len(data) > kind.limit:
         _refuse(error, name, f"larger than {kind.limit / 2**20:g} MB, which is too much for {kind.name}; {kind.remedy}")
     return data
+
+
+def _open(path: str, flags: int) -> int:
+    """Open a file without waiting for somebody to write to it, should it be a pipe; what is read is waited for as ever."""
+    if not hasattr(os, "O_NONBLOCK"):
+        return os.open(path, flags)
+    number = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(number, True)
+    return number
 
 
 def _normal(text: str) -> str:

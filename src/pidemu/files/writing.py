@@ -15,7 +15,7 @@ from typing import IO, Any, BinaryIO, Final, Literal, NoReturn, TextIO, overload
 
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
-from pidemu.files.reading import reason
+from pidemu.files.reading import is_folder, reason
 
 _FULL: Final = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG")} - {None}
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -137,10 +137,15 @@ def _fail(name: str, error: type[PidemuError], fault: OSError | ValueError) -> N
 
 def _target(path: str | Path, name: str, error: type[PidemuError], inputs: tuple[str | Path, ...]) -> Path | None:
     """Return the file that is to be replaced, the one at the end of all links; ``None`` for what is written straight."""
+    if not name:
+        raise error("no name of a file to write; give a file name")
     try:
         found = os.stat(path)
     except FileNotFoundError:
-        return Path(os.path.realpath(path))
+        target = Path(os.path.realpath(path))
+        if is_folder(target):  # as none/.. is
+            raise error(f"{name}: cannot be written: it is a folder") from None
+        return target
     except ValueError as fault:
         _fail(name, error, fault)
     if stat.S_ISDIR(found.st_mode):

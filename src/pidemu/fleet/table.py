@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pidemu.card.library import folders, load_card
+from pidemu.card.library import folders, load_card_by_id, loaded_files
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
@@ -105,9 +105,9 @@ class LoopTable:
         Raises
         ------
         FleetError
-            The file cannot be written, or is the file of loops.
+            The file cannot be written, is the file of loops, or that of a card.
         """
-        write_table(path, HEADER, self.rows(result), FleetError, inputs=[self.path])
+        write_table(path, HEADER, self.rows(result), FleetError, inputs=[self.path, *loaded_files()])
 
 
 def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
@@ -168,8 +168,8 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
 
 
 def _lines(path: str | Path) -> Lines:
-    """Return the lines of a file; a control character costs its row only."""
-    lines = split_lines(read_text(path, FleetError, _KIND, controls=False), empty=" \t,;")
+    """Return the lines of a file; a control character, or a byte that is not UTF-8, costs its row only."""
+    lines = split_lines(read_text(path, FleetError, _KIND, by_line=True), empty=" \t,;")
     if len(lines.rows) < 2:
         wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
         raise FleetError(f"{visible(str(path))}: no loops; {wanted}")
@@ -210,7 +210,8 @@ def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequ
     first = seen.setdefault(row["tag"], line)
     if first != line:
         raise FleetError(f"line {first} has this tag already; give each loop its own")
-    given = assignments(word for word in row.get("settings", "").split(";") if word.strip())
+    words = (word for word in row.get("settings", "").split(";") if word.strip())
+    given = assignments(words, such="GAIN=2; RESET=20 s/repeat", between="semicolons, such as GAIN=2; RESET=20")
     readers = {"scan": seconds, "time": seconds, "setpoint": step, "load": step, "limits": pair, "action": _action}
     found: dict[str, Any] = {}
     for name, read in readers.items():
@@ -219,7 +220,7 @@ def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequ
                 found["output_limits" if name == "limits" else name] = read(row[name])
             except SettingError as error:
                 raise SettingError(f"{name}: {error}") from None
-    settings = load_card(row["card"], vendors).settings(given)
+    settings = load_card_by_id(row["card"], vendors).settings(given)
     return Loop(row["tag"], settings, parse_process(row["process"]), **found)
 
 

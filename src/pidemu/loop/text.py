@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from pidemu.errors import ProcessError, UnitError, suggest
+from pidemu.excerpt import quoted
 from pidemu.loop.roots import count, poles_of, zeros_of
 from pidemu.plain import exactly
 from pidemu.units import Role, parse_quantity, to_canonical
@@ -23,6 +24,10 @@ def read(text: str) -> tuple[float, list[complex], list[complex], float]:
         name, equals, value = (part.strip() for part in item.partition("="))
         if not equals or not value:
             raise ProcessError(f"'{item.strip()}' in '{text}' is not NAME=VALUE; write for example gain=1.5,lag=10 s,delay=3 s")
+        if "=" in value:
+            raise ProcessError(
+                f"'{quoted(item.strip(), 200)}' is more than one part; separate them by commas, such as gain=1.5,lag=10,delay=3"
+            )
         if name not in given:
             raise ProcessError(f"unknown name '{name}' in '{text}'{suggest(name, _NAMES)}; names: {', '.join(_NAMES)}")
         if given[name] and name in ("gain", "integrators", "delay"):
