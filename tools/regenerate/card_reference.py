@@ -11,26 +11,16 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pidemu.card import base, integral, models, stages, terms
 from pidemu.card.models import CardFile, Equation
 
 BEGIN: Final = "<!-- generated from src/pidemu/card/models.py: begin -->"
 END: Final = "<!-- generated from src/pidemu/card/models.py: end -->"
 
-_ORDER: Final = (
-    CardFile, base.Source, models.Equation, terms.Setpoint, terms.Measurement, terms.SignalFilter, terms.ErrorShape,
-    terms.Proportional, terms.Cascade, integral.Integral, integral.IntegralLimits, integral.WindupNone, integral.WindupClamp,
-    integral.WindupGate, integral.WindupRecompute, integral.WindupBackCalculation, integral.WindupExternalReset,
-    integral.FastReturn, integral.WindupVelocity, integral.WindupResetOutsideBand, terms.Derivative, terms.Filter,
-    terms.Feedforward, stages.Transfer, models.Setting, models.Option, stages.Action, stages.ActionExample, stages.Scan,
-    stages.Output, stages.Arithmetic, stages.Faults, base.Evidence, models.Quirk, models.Example, models.Canonical,
-)  # fmt: skip
-
 
 def reference() -> str:
     """Return the field reference in Markdown: one table per part of a card."""
     lines: list[str] = []
-    for model in _ORDER:
+    for model in _parts():
         lines += [
             f"### {_heading(model)}",
             "",
@@ -47,6 +37,29 @@ def reference() -> str:
             lines.append(f"| `{field.alias or name}` | {_type(field)} | {need} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
+
+
+def _parts() -> list[type[BaseModel]]:
+    """Return the models of a card in the order in which its fields name them, the fields of its equation first."""
+    found: list[type[BaseModel]] = [CardFile, Equation]
+
+    def walk(model: type[BaseModel]) -> None:
+        for field in model.model_fields.values():
+            for part in _models(field.annotation):
+                if part not in found:
+                    found.append(part)
+                    walk(part)
+
+    walk(Equation)
+    walk(CardFile)
+    return found
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models that an annotation names."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in typing.get_args(annotation) for model in _models(argument)]
 
 
 def _heading(model: type[BaseModel]) -> str:
