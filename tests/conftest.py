@@ -1,4 +1,8 @@
-"""One Hypothesis profile for every property: loops over scans are slow, and slowness is no failure.
+"""The fast selection, one Hypothesis profile, and a folder for generated code.
+
+Files that `selection` does not list as slow are marked `fast`; ``pytest -m fast`` does not even read the slow ones.
+
+One Hypothesis profile holds for every property: loops over scans are slow, and slowness is no failure.
 
 In continuous integration (``CI`` set) the examples are the same in every run; elsewhere every run looks at new ones.
 
@@ -20,6 +24,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from pidemu import cache
+from tests.selection import FOLDER, is_slow
 
 settings.register_profile(
     "pidemu",
@@ -46,6 +51,18 @@ def _folder_for_generated_code() -> str:
 
 if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have that of the process that started them
     os.environ["PIDEMU_CACHE"] = _folder_for_generated_code()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave slow files unread where only fast tests are asked for."""
+    return True if config.option.markexpr == "fast" and collection_path != FOLDER and is_slow(collection_path) else None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of all files that are not slow."""
+    for item in items:
+        if not is_slow(item.path):
+            item.add_marker(pytest.mark.fast)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import re
 
 import pytest
 
-from tests.readme import ROOT, read
+from tools.regenerate.pages import ROOT, read
 
 TEXT = read(ROOT / "CONTRIBUTING.md")
 SOURCE = ROOT / "src" / "pidemu"

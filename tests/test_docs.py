@@ -1,4 +1,4 @@
-"""What README and docs show is true today: commands, code, quoted files, options, links. `python -m tests.readme` renews them."""
+"""README and docs are true today: commands, code, quoted files, options, links. `python -m tools.regenerate` renews them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import click
 import pytest
 
 from pidemu.cli import cli
-from tests.readme import CUT, PAGES, README, ROOT, Shown, commands, prepare, python_blocks, quotations, read, run, shortened
+from tests.page_code import python_blocks, quotations, run
+from tools.regenerate import RENEW
+from tools.regenerate.pages import CUT, PAGES, README, ROOT, Shown, commands, prepare, read, shortened
 
 SHOWN = [shown for page in PAGES for shown in commands(page)]
 WITH_CODE = [page for page in PAGES if python_blocks(page)]
@@ -30,7 +32,7 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("shown", SHOWN, ids=[f"{s.page.name}: {s.command}" for s in SHOWN])
 def test_a_command_prints_what_the_page_shows(shown: Shown, tmp_path: Path) -> None:
     prepare(shown.page, tmp_path)
-    assert shown.printed == shown.today()
+    assert shown.printed == shown.today(), RENEW
 
 
 @pytest.mark.usefixtures("_in_folder")

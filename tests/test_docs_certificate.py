@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from tests.cli.helpers import said
-from tests.readme import ROOT, prepare, python_blocks, read, run
+from tests.page_code import python_blocks, run
+from tools.regenerate.pages import ROOT, prepare, read
 
 PAGE = ROOT / "docs" / "certificate.md"
 TEXT = read(PAGE)

@@ -17,7 +17,8 @@ import pytest
 import pidemu
 from pidemu.engines import ENGINES
 from pidemu.fleet.result import HEADER
-from tests.readme import ROOT, prepare, printed_by, python_blocks, read, run
+from tests.page_code import python_blocks, run
+from tools.regenerate.pages import ROOT, prepare, printed_by, read
 
 PAGE = ROOT / "docs" / "fleet.md"
 TEXT = read(PAGE)

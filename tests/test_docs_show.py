@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pidemu
-from tests.readme import ROOT, read
+from tools.regenerate.pages import ROOT, read
 
 TEXT = read(ROOT / "docs" / "show.md")
 

@@ -66,6 +66,30 @@ def test_the_archives_hold_every_card(archives: tuple[Path, Path]) -> None:
     assert specs | {"pyproject.toml", "LICENSE", "README.md", "tests/conftest.py"} <= names
 
 
+def test_what_developers_run_is_in_the_source_archive_and_not_in_the_wheel(archives: tuple[Path, Path]) -> None:
+    sdist, wheel = archives
+    tools = {f.relative_to(ROOT).as_posix() for f in (ROOT / "tools").rglob("*.py")}
+    assert {"tools/regenerate/__main__.py", "tools/fuzz/__main__.py"} <= tools
+    with tarfile.open(sdist) as archive:
+        assert tools <= {n.split("/", 1)[1] for n in archive.getnames() if "/" in n}
+    packed = {n: zipfile.ZipFile(wheel).read(n) for n in zipfile.ZipFile(wheel).namelist()}
+    assert [n for n in packed if "tools" in n.split("/") or "tests" in n.split("/")] == []
+    assert [n for n, text in packed.items() if n.endswith(".py") and b"\nif __name__ ==" in text] == []
+
+
+EVERY_MODULE = """
+import importlib, pkgutil, pidemu
+names = [m.name for m in pkgutil.walk_packages(pidemu.__path__, "pidemu.") if not m.name.endswith("__main__")]
+for name in names:
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        assert error.name in ("numba", "jinja2", "matplotlib", "scipy", "pyarrow", "distributed"), (name, error)
+print(len(names))
+"""
+"""Imports all modules; those that need an extra may say so."""
+
+
 def test_the_installed_wheel_converts_and_checks_far_from_the_repository(archives: tuple[Path, Path], tmp_path: Path) -> None:
     environment, elsewhere = tmp_path / "environment", tmp_path / "elsewhere"
     elsewhere.mkdir()
@@ -80,3 +104,8 @@ def test_the_installed_wheel_converts_and_checks_far_from_the_repository(archive
     assert {k: here[k] for k in ("from", "to", "verdict")} == {k: found[k] for k in ("from", "to", "verdict")}
     assert _run([scripts / "pidemu", "check"], elsewhere).stdout == f"{len(CARDS)} cards, 0 problems\n"
     assert _run([scripts / "pidemu", "--version"], elsewhere).stdout == f"pidemu {pidemu.__version__}\n"
+    there = {f.relative_to(ROOT / "src").as_posix() for f in (ROOT / "src").rglob("*.py")} - {
+        "pidemu/__init__.py",
+        "pidemu/__main__.py",
+    }
+    assert _run([scripts / "python", "-c", EVERY_MODULE], elsewhere).stdout == f"{len(there)}\n"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from tests.readme import PICTURE, PICTURED, README, ROOT, commands, read
+from tools.regenerate.pages import README, ROOT, commands, read
+from tools.regenerate.picture import PICTURE, PICTURED
 
 TEXT = read(README)
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 import pidemu
-from pidemu.card.emulation import FILE, table
 from pidemu.card.load import EMULATION
+from tools.regenerate import RENEW, emulation
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_page_is_what_the_cards_say_today() -> None:
-    assert FILE.read_text(encoding="utf-8") == table(), "run python -m pidemu.card.emulation"
+    assert (ROOT / "docs" / "emulation.md").read_text(encoding="utf-8") == emulation.text(), RENEW
 
 
 @pytest.mark.parametrize("name", pidemu.cards())

@@ -11,10 +11,11 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.card import base, integral, models, schema, stages, terms
+from pidemu.card import base, integral, models, stages, terms
 from pidemu.card.load import card_from
 from pidemu.card.source import parse
 from pidemu.errors import CardError
+from tools.regenerate import RENEW, card_reference, card_schema
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -41,17 +42,17 @@ def plain(card_id: str) -> Any:
 
 
 def test_the_schema_in_the_repository_is_what_the_models_generate() -> None:
-    assert (SPECS / "card.schema.json").read_text(encoding="utf-8") == schema.schema_text()
+    assert (SPECS / "card.schema.json").read_text(encoding="utf-8") == card_schema.text(), RENEW
 
 
 def test_the_language_document_holds_the_reference_that_the_models_generate() -> None:
     text = (SPECS / "card-language.md").read_text(encoding="utf-8")
-    assert text == schema.updated(text)
+    assert text == card_reference.updated(text), RENEW
 
 
 def test_a_document_without_the_marks_is_refused() -> None:
     with pytest.raises(ValueError, match="needs the lines"):
-        schema.updated("nothing generated here")
+        card_reference.updated("nothing generated here")
 
 
 @pytest.mark.parametrize("card_id", pidemu.cards())
@@ -143,27 +144,27 @@ def test_the_schema_takes_what_the_loader_takes(path: tuple[str, ...], value: An
 
 
 def test_no_union_is_left_that_an_editor_would_ignore() -> None:
-    text = schema.schema_text()
+    text = card_schema.text()
     assert "discriminator" not in text
     assert "oneOf" not in text
 
 
 def test_every_field_of_the_language_has_a_description() -> None:
-    for line in schema.reference().splitlines():
+    for line in card_reference.reference().splitlines():
         if line.startswith("| `"):
             assert line.rstrip("| ").split("|")[-1].strip() not in ("", "None"), line
 
 
 def test_every_line_of_the_reference_s_tables_has_four_cells() -> None:
-    lines = [line for line in schema.reference().splitlines() if line.startswith("|")]
+    lines = [line for line in card_reference.reference().splitlines() if line.startswith("|")]
     assert [line for line in lines if line.replace("\\|", "").count("|") != 5] == []
 
 
 def test_every_part_of_the_language_is_in_the_reference() -> None:
     headings = {
-        line.removeprefix("### ").lower().replace(" ", "-") for line in schema.reference().splitlines() if line[:3] == "###"
+        line.removeprefix("### ").lower().replace(" ", "-") for line in card_reference.reference().splitlines() if line[:3] == "###"
     }
-    linked = set(re.findall(r"\(#([a-z-]+)\)", schema.reference()))
+    linked = set(re.findall(r"\(#([a-z-]+)\)", card_reference.reference()))
     assert linked <= headings
     rooms = (base, integral, models, stages, terms)
     parts = {name.lower() for room in rooms for name, c in vars(room).items() if isinstance(c, type) and issubclass(c, base.Model)}

@@ -17,7 +17,7 @@ from pidemu.certificate.exact_law import ExactLaw, difference, divide, exact_alg
 from pidemu.exact_numbers import Exact
 from pidemu.rational import multiply
 from pidemu.settings import Settings
-from tests.conversion.test_options import CARDS, SOURCES
+from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import settings_of
 
 s = sp.Symbol("s")

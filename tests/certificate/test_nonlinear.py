@@ -22,7 +22,7 @@ from pidemu.record.sampling import limits_for
 from pidemu.record.standard import scale_of, standard_record
 from pidemu.settings import Settings
 from tests.checks.bench import VALID, edited, written
-from tests.conversion.test_options import CARDS, SOURCES
+from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import Floats
 
 STAYS = "at the limit after the error has turned [s]"

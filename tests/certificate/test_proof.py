@@ -20,10 +20,10 @@ from pidemu.certificate.models import EXACT
 from pidemu.certificate.proof import Proof, prove
 from pidemu.errors import ConversionRefusedError, SettingError
 from pidemu.settings import Settings
+from tests.conversion.exact_pairs import EXACT as EXACT_PAIRS
+from tests.conversion.exact_pairs import FEEDBACK, Pair
 from tests.conversion.support import needed, settings_that_act
-from tests.conversion.test_exact import EXACT as EXACT_PAIRS
-from tests.conversion.test_exact import FEEDBACK, Pair
-from tests.conversion.test_options import CARDS, SOURCES
+from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import made_up_card
 
 PAIRS = list(itertools.product(CARDS, CARDS))

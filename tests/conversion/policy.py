@@ -12,7 +12,7 @@ import pidemu
 from pidemu.errors import ConversionRefusedError, ScanError
 from pidemu.settings import Settings
 from tests.conversion.support import needed, settings_that_act
-from tests.conversion.test_options import CARDS
+from tests.conversion.usual import CARDS
 
 PAIRS = list(itertools.product(CARDS, CARDS))
 RANGES: dict[str, object] = {"pv_range": (0, 100), "op_range": (0, 100)}

@@ -11,10 +11,10 @@ import pytest
 
 import pidemu
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError
 from pidemu.settings import Settings
-from tests.conversion.support import HUNDRED, Complex, Floats, continuous, needed, outputs
-from tests.conversion.test_options import CARDS
+from tests.conversion.settled import load, settled
+from tests.conversion.support import Complex, Floats, continuous, needed, outputs
+from tests.conversion.usual import CARDS
 from tests.helpers import WIDE
 
 Ti = 60.0
@@ -38,13 +38,6 @@ DIALS = {
 }
 
 
-def load(card: str, **dials: object) -> Settings:
-    """Settings with ranges of 0 to 100 and, where they are not named, the options as the card delivers them."""
-    named = {d.casefold() for d in dials}
-    options = {n: c for n, c in pidemu.load_card(card).variant({}).chosen.items() if n.casefold() not in named}
-    return pidemu.load_card(card).settings({**HUNDRED, **options, **dials})
-
-
 def made(card: str, ratio: float, **more: object) -> Settings:
     """Gain 2, integral time 60 s, derivative time by its ratio to that; a filter of a tenth where the card lets one choose."""
     Td = ratio * Ti
@@ -54,14 +47,6 @@ def made(card: str, ratio: float, **more: object) -> Settings:
     gain = "50 %" if card == "foxboro/pneumatic" else 2
     values = (gain, f"{Ti} s/repeat", f"{Td!r} s" if Td else 0)
     return load(card, **{**dict(zip(DIALS[card], values, strict=True)), **SERIES.get(card, {}), **own, **more})
-
-
-def settled(source: Settings, target: str, **arguments: object) -> tuple[Conversion | None, str]:
-    """Return the conversion and no reason, or what a refusal offers and its reason."""
-    try:
-        return pidemu.convert(source, target, emulate=False, **arguments), ""  # type: ignore[arg-type]
-    except ConversionRefusedError as refusal:
-        return refusal.nearest, str(refusal)
 
 
 def apart(conversion: Conversion, low: float, high: float) -> float:

@@ -14,9 +14,9 @@ from pidemu.card.base import Rule
 from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
 from pidemu.settings import Settings, off_values
 from pidemu.units import Role
+from tests.conversion.settled import load, settled
 from tests.conversion.support import Floats, difference, needed, random_signal
-from tests.conversion.test_adversarial import load, settled
-from tests.conversion.test_options import CARDS
+from tests.conversion.usual import CARDS
 from tests.helpers import WIDE
 
 SIGNED = [

@@ -18,7 +18,7 @@ from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError, ScanError
 from pidemu.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, rules, settings_that_act
-from tests.conversion.test_options import CARDS, SOURCES
+from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import WIDE, Floats
 
 PAIRS = list(itertools.product(CARDS, CARDS))

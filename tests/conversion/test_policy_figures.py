@@ -22,7 +22,7 @@ from pidemu.settings import Settings, off_values
 from pidemu.units import Role
 from tests.conversion.policy import RANGES, convert, converted, drawn
 from tests.conversion.support import continuous, random_signal
-from tests.conversion.test_options import CARDS, usual
+from tests.conversion.usual import CARDS, usual
 from tests.helpers import WIDE, Floats, scans_of
 
 START = 50.0

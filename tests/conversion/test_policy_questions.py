@@ -23,7 +23,7 @@ from pidemu.units import Role
 from tests.cli.helpers import said, strict_json
 from tests.conversion.policy import PAIRS, RANGES, convert, converted, drawn, held, numbers, stated
 from tests.conversion.support import settings_that_act
-from tests.conversion.test_options import CARDS
+from tests.conversion.usual import CARDS
 from tests.helpers import dials_of
 
 FACTORS = {"s": 1.0, "min": 60.0, "h": 3600.0}

@@ -19,7 +19,7 @@ import pidemu
 from pidemu.conversion import verify as module
 from pidemu.errors import CertificateError, PidemuError
 from tests.cli.helpers import said, strict_json, with_another_filter
-from tests.conversion.test_document import CONVERSIONS, OTHERS
+from tests.conversion.commands import CONVERSIONS, OTHERS
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--scan", "1,0.5")
 

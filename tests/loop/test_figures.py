@@ -19,7 +19,7 @@ from pidemu.law import Law
 from pidemu.loop.figures import crossover, loop_figures, scan_for, time_scale
 from pidemu.loop.open_loop import OpenLoop, picture_of
 from pidemu.loop.process import Process
-from tests.loop.test_process import processes, transfer_function
+from tests.loop.processes import processes, transfer_function
 
 FOPDT = Process.from_lags(1, [1], delay=1)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import control
 import numpy as np
@@ -18,25 +17,9 @@ import pidemu
 from pidemu.errors import ProcessError
 from pidemu.loop.hold import Plant
 from pidemu.loop.process import Process, parse_process
+from tests.loop.processes import processes
 
 Floats = npt.NDArray[np.float64]
-
-sizes = st.floats(0.02, 5)
-pairs = st.builds(lambda size, z: size * complex(-z, math.sqrt(1 - z * z)), sizes, st.floats(0.05, 0.95))
-
-
-@st.composite
-def processes(draw: st.DrawFn) -> Process:
-    """Stable or integrating processes of up to four poles, without dead time."""
-    upper = draw(st.lists(pairs, max_size=1))
-    real = draw(st.lists(sizes.map(lambda x: -x) | st.just(0.0), min_size=1, max_size=2))
-    zeros = draw(st.lists(sizes.map(lambda x: -x) | sizes, max_size=len(real) - 1))
-    poles = [*real, *(x for p in upper for x in (p, p.conjugate()))]
-    return Process(draw(sizes | sizes.map(lambda x: -x)), poles, zeros)
-
-
-def transfer_function(p: Process) -> Any:
-    return control.tf(list(p.rational.num[::-1]), list(p.rational.den[::-1]))
 
 
 @given(process=processes(), delay=st.just(0.0) | st.floats(0.1, 20))

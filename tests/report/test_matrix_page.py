@@ -1,9 +1,7 @@
-"""The heat map, and the three files in docs that are generated from all cards."""
+"""The heat map: a page that needs nothing but itself and the files of the cards."""
 
 from __future__ import annotations
 
-import csv
-import random
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,16 +9,13 @@ from urllib.parse import unquote
 
 import pytest
 
-import pidemu
 from pidemu.errors import PidemuError
-from pidemu.matrix.cell import OUTCOMES, Cell, Work, cell
+from pidemu.matrix.cell import OUTCOMES, Cell
 from pidemu.matrix.matrix import Matrix, matrix
-from pidemu.report.matrix_page import DOCS, page, shade, summary, write_page
+from pidemu.report.matrix_page import page, shade, write_page
 from tests.checks.bench import VALID, edited, written
 
-CARDS = [c for c in pidemu.cards() if c != "generic/dahlin"]
 FOUR = ("fisher/provox", "emerson/deltav", "generic/standard", "bailey/fc19")
-RENEW = "run python -m pidemu.report.matrix_page"
 
 
 class Reader(HTMLParser):
@@ -68,17 +63,6 @@ def read(text: str) -> Reader:
 @pytest.fixture(scope="module")
 def four() -> Matrix:
     return matrix(FOUR, emulate=False)
-
-
-@pytest.fixture(scope="module")
-def rows() -> list[dict[str, str]]:
-    with (DOCS / "matrix.csv").open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
-@pytest.fixture(scope="module")
-def heat_map() -> Reader:
-    return read((DOCS / "matrix.html").read_text(encoding="utf-8"))
 
 
 def test_every_cell_leads_to_its_row_and_every_head_to_its_section(four: Matrix, tmp_path: Path) -> None:
@@ -139,49 +123,13 @@ def test_every_outcome_has_a_shade_that_the_page_defines(four: Matrix, tmp_path:
     assert all(f".{shade(Cell('a/a', 'b/b', outcome, 0.5))} {{" in text for outcome in OUTCOMES)
 
 
-def test_the_summary_counts_every_conversion_once(four: Matrix) -> None:
-    table = [line.strip("| ").split("|") for line in summary(four).splitlines() if line.startswith("| [")]
-    assert len(table) == 8  # as a source and as a target
-    assert [sum(int(n) for n in row[1:7] if n.strip()) for row in table] == [4] * 8
-
-
-def test_the_docs_list_every_ordered_pair_of_cards(rows: list[dict[str, str]]) -> None:
-    assert [(r["source"], r["target"]) for r in rows] == [(a, b) for a in CARDS for b in CARDS], RENEW
-    assert {r["verdict"] for r in rows if r["source"] == r["target"]} == {"exact"}
-    assert not [r for r in rows if r["verdict"] == "failed"]
-
-
-def test_the_docs_are_what_conversions_give_today(rows: list[dict[str, str]]) -> None:
-    work = Work({c: c for c in CARDS}, (), derivative=True, emulate=True)
-    for row in random.Random(1).sample(rows, 40):
-        found = cell(work, row["source"], row["target"])
-        pair = f"{row['source']} to {row['target']}: {RENEW}"
-        assert (row["verdict"], row["match"], row["source_settings"], row["command"]) == (
-            found.verdict, found.match, found.given, found.command
-        ), pair  # fmt: skip
-        names = ("feedback_deviation", "setpoint_deviation", "scan_by_scan_feedback", "scan_by_scan", "movement")
-        for name, figure in zip(names, found.figures, strict=True):
-            stated = float(row[name]) if row[name] else None
-            assert stated == pytest.approx(figure, rel=2e-3, abs=1e-8), f"{name} of {pair}"  # four digits, and rounding elsewhere
-
-
-def test_page_and_data_in_the_docs_agree(rows: list[dict[str, str]], heat_map: Reader) -> None:
-    assert len(heat_map.marks) == len(rows)
-    for row in rows:
-        name, mark = heat_map.marks[f"{row['source']} to {row['target']}: {row['verdict']}"]
-        deviation = float(row["feedback_deviation"] or 0)
-        if row["verdict"] == "approximate" and 1e-4 <= deviation < 9.99:
-            assert float(mark) == pytest.approx(100 * deviation, rel=0.06, abs=0.005)  # two digits, two decimals
-            assert name.startswith("a")
-        elif row["verdict"] != "approximate":
-            assert (name, mark) == {"exact": ("e", "="), "exact-feedback": ("f", "="), "refused": ("r", "x")}[row["verdict"]]
-
-
-def test_links_in_the_docs_lead_to_the_cards(heat_map: Reader) -> None:
-    assert [link for link in heat_map.links if not link.startswith("#")] == [f"../vendors/{c}.yaml" for c in CARDS]
-
-
-def test_the_pages_in_the_docs_name_every_card_and_stay_small() -> None:
-    text = (DOCS / "matrix.md").read_text(encoding="utf-8")
-    assert all(text.count(f"[{c}](matrix.html#{c})") == 2 for c in CARDS), RENEW
-    assert (DOCS / "matrix.html").stat().st_size < 900_000
+def test_every_mark_of_the_map_is_what_the_conversion_came_to(four: Matrix, tmp_path: Path) -> None:
+    marks = read(page(four, tmp_path)).marks
+    assert len(marks) == len(four.cells)
+    for c in four.cells:
+        name, mark = marks[f"{c.source} to {c.target}: {c.verdict}"]
+        if c.verdict == "approximate":
+            assert name == shade(c)
+            assert float(mark) == pytest.approx(100 * (c.deviation or 0), rel=0.06, abs=0.005)  # two digits, two decimals
+        else:
+            assert (name, mark) == {"exact": ("e", "="), "exact-feedback": ("f", "="), "refused": ("r", "x")}[c.verdict]

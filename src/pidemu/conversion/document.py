@@ -1,6 +1,6 @@
 """A conversion, a question or a refusal as plain values, the form of ``--json``: with its version, and all to compute it again.
 
-``specs/conversion.schema.json`` states the form, made by `pidemu.conversion.schema`.
+``specs/conversion.schema.json`` states the form, made from the models in `pidemu.conversion.schema`.
 """
 
 from __future__ import annotations

@@ -1,24 +1,17 @@
-"""The form of ``pidemu convert --json``, for programs that read it: models, and the JSON Schema made from them.
+"""The form of a conversion in ``pidemu convert --json``, as models: what `pidemu.verify` reads certificates with.
 
-``python -m pidemu.conversion.schema`` in the repository writes ``specs/conversion.schema.json``; a test fails while it is not
-current.
+``python -m tools.regenerate`` in the repository makes ``specs/conversion.schema.json`` from them.
 """
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, RootModel, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field
 
-from pidemu.certificate import models
-from pidemu.certificate.models import Certificate, Verdict
-from pidemu.certificate.proof import Proof
+from pidemu.certificate.models import Verdict
 from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Kind as BesideKind
-from pidemu.conversion.document import SCHEMA
-from pidemu.conversion.questions import Kind
 
 Number = float | Literal["inf", "-inf", "nan"]
 """JSON has no infinity: it is written as a word."""
@@ -27,8 +20,6 @@ Line = Annotated[str, Field(max_length=2000)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-_CERTIFICATE: Final = "Certificate"
-_LINES: Final = {"type": "array", "items": {"type": "string"}}
 
 
 class Part(BaseModel):
@@ -74,12 +65,6 @@ class Target(Side):
 
     settings: dict[Name, TargetDial] = Field(description="The dials in use, by name.")  # type: ignore[assignment]
     lag_on_pv: Number = Field(description="A first-order lag on the measurement that has to stand in front of the block [s].")
-
-
-class Card(Part):
-    """A target of which nothing but the card is known."""
-
-    card: Name
 
 
 class AsGiven(Part):
@@ -237,129 +222,3 @@ class ConversionPart(Part):
     at_the_loop: list[str]
     command: str = Field(description="The command that makes the conversion again.")
     transfer_plan: Plan | None = Field(default=None, description="With `--cut-over`.")
-
-
-class Reading(Part):
-    """One way to answer a question."""
-
-    value: str
-    says: str
-    settings: dict[Name, Dial] | None = Field(description="What it leads to; null where the target refuses or more is asked.")
-    options: dict[Name, str] | None
-    outcome: str = Field(description="Why there are no settings.")
-    command: str = Field(description="The command that states it.")
-    alike: list[str]
-
-
-class QuestionPart(Part):
-    """Something that only the user can know, and that changes the result."""
-
-    kind: Kind
-    about: str
-    text: str
-    readings: Annotated[list[Reading], Field(max_length=6)]
-
-
-class QuestionsPart(Part):
-    """Questions that have to be answered first."""
-
-    schema_: Literal["pidemu-conversion-1"] = Field(alias="schema")
-    source: Side | None = Field(default=None, alias="from")
-    to: Card | None = None
-    verdict: Literal["question"]
-    questions: Annotated[list[QuestionPart], Field(min_length=1)]
-
-
-class RefusalPart(Part):
-    """Why the target cannot do what the source does."""
-
-    schema_: Literal["pidemu-conversion-1"] = Field(alias="schema")
-    source: Side | None = Field(default=None, alias="from")
-    to: Card | None = None
-    verdict: Literal["refused"]
-    reason: str
-    nearest: ConversionPart | None = Field(description="The nearest settings, as `--allow-approximate` gives them.")
-    alternatives: list[str]
-
-
-class Outcome(RootModel[ConversionPart | QuestionsPart | RefusalPart]):
-    """What ``pidemu convert --json`` prints."""
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of what ``pidemu convert --json`` prints."""
-    plain: dict[str, Any] = Outcome.model_json_schema(by_alias=True, mode="serialization")
-    definitions: dict[str, Any] = plain.pop("$defs")
-    certificate = TypeAdapter(Certificate)
-    certificate.rebuild(_types_namespace={**vars(models), "Proof": Proof})
-    figures = certificate.json_schema(mode="serialization")
-    definitions |= {**figures.pop("$defs"), _CERTIFICATE: figures}
-    definitions["Number"] = {"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf", "nan"]}]}
-    for name in (*figures_of(figures, definitions), _CERTIFICATE):
-        _close(definitions[name])
-    definitions["Kick"]["properties"]["ratio"] = {"$ref": "#/$defs/Number", "description": "Target's kick per source's."}
-    definitions["Kick"]["required"].append("ratio")
-    more = {"feedback_equal": {"type": "boolean"}, "setpoint_equal": {"type": "boolean"}, "text": _LINES}
-    definitions["Proof"]["properties"] |= more
-    definitions["Proof"]["required"] += list(more)
-    reference = {"$ref": f"#/$defs/{_CERTIFICATE}"}
-    definitions["ConversionPart"]["properties"]["certificate"] = reference
-    definitions["TextbookPart"]["properties"]["certificate"] = {"anyOf": [reference, {"type": "null"}]}
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": SCHEMA}
-    found: dict[str, Any] = _without_titles({**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions})
-    return found
-
-
-def figures_of(figures: dict[str, Any], definitions: dict[str, Any]) -> set[str]:
-    """Return the names of the definitions that the certificate's figures are made of."""
-    found: set[str] = set()
-    waiting: list[Any] = [figures]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, dict):
-            name = str(node.get("$ref", "")).rpartition("/")[2]
-            if name and name not in found:
-                found.add(name)
-                waiting.append(definitions[name])
-            waiting += node.values()
-        elif isinstance(node, list):
-            waiting += node
-    return found
-
-
-def _close(definition: dict[str, Any]) -> None:
-    """Require all properties of a dataclass, allow no others, and write infinite numbers as words."""
-    definition["required"] = list(definition["properties"])
-    definition["additionalProperties"] = False
-    definition["description"] = definition.get("description", "").partition("\n")[0]
-    definition["properties"] = {name: _numbers(p) for name, p in definition["properties"].items()}
-
-
-def _numbers(node: Any) -> Any:
-    if isinstance(node, dict):
-        if node.get("type") == "number":
-            return {"$ref": "#/$defs/Number"}
-        return {k: _numbers(v) for k, v in node.items() if k != "default"}
-    return [_numbers(v) for v in node] if isinstance(node, list) else node
-
-
-def _without_titles(node: Any) -> Any:
-    """Remove the titles that repeat a property's name."""
-    if isinstance(node, dict):
-        return {k: _without_titles(v) for k, v in node.items() if k != "title" or not isinstance(v, str) or v == SCHEMA}
-    return [_without_titles(v) for v in node] if isinstance(node, list) else node
-
-
-def text() -> str:
-    """Return the schema's file."""
-    return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
-
-
-def main() -> None:
-    """Write the schema's file."""
-    folder = Path(__file__).resolve().parents[3] / "specs"
-    (folder / "conversion.schema.json").write_text(text(), encoding="utf-8", newline="\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,4 @@
-"""README and docs: what their commands print, and their code.
-
-``python -m tests.readme`` writes what the commands print today into every page; with ``--picture`` it also takes the picture of a
-certificate, for which a Chromium is needed.
+"""README and docs: the commands that they show, with what these print.
 
 A comment in a page, in the line before a block, says more about it:
 
@@ -14,37 +11,28 @@ A comment in a page, in the line before a block, says more about it:
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from click.testing import CliRunner
 
 from pidemu.cli import cli
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 PAGES = (README, *sorted((ROOT / "docs").glob("*.md")))
-PICTURE = ROOT / "docs" / "certificate.png"
-PICTURED = "convert fisher/provox GAIN=2 RESET=4 RATE=0.1 --to emerson/deltav"
-"""The conversion of the README, whose certificate is pictured."""
 CUT = "[...]"
 CONSOLE = re.compile(
     r"^(?P<head>(?:<!-- shown: (?P<parts>.*) -->\n)?```console\n\$ pidemu (?P<command>.*)\n)(?P<printed>(?:.*\n)*?)```$",
     re.MULTILINE,
 )
-_PYTHON = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"^<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-_PART = re.compile(r"^<!-- part of: (\S+) -->\n```\w+\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 def signed_certificate(folder: Path) -> None:
@@ -94,16 +82,6 @@ def commands(page: Path) -> list[Shown]:
     return found
 
 
-def python_blocks(page: Path) -> list[str]:
-    """Return the blocks of code of a page."""
-    return _PYTHON.findall(read(page))
-
-
-def quotations(page: Path) -> list[tuple[str, str]]:
-    """Return path and text of each block that is a part of a file."""
-    return _PART.findall(read(page))
-
-
 def prepare(page: Path, folder: Path) -> None:
     """Put the files that a page's commands and code read into a folder: the examples, and those that the page shows."""
     shutil.copytree(ROOT / "examples", folder / "examples")
@@ -146,78 +124,12 @@ def _line(lines: list[str], begin: str, start: int) -> int:
     return len(lines)
 
 
-def statements(block: str) -> list[tuple[str, str, bool]]:
-    """Return each statement of a block, what its comment says it gives, and whether it is an expression."""
-    lines = block.splitlines()
-    found = []
-    for node in ast.parse(block).body:
-        assert node.end_lineno is not None
-        code = "\n".join(lines[node.lineno - 1 : node.end_lineno])
-        comment = lines[node.end_lineno - 1].partition("  # ")[2]
-        found.append((code, comment, isinstance(node, ast.Expr)))
-    return found
+def renewed(page: Path, text: str) -> str:
+    """Return the text of a page with what its commands print today."""
 
-
-def run(block: str, names: dict[str, Any]) -> int:
-    """Run a block of code and hold the value of each expression against its comment; return how many there are.
-
-    The comment behind any other statement is prose.
-    """
-    checked = 0
-    for code, expected, is_expression in statements(block):
-        if not (is_expression and expected):
-            exec(code, names)
-            continue
-        assert eval(code.partition("  # ")[0], names) == ast.literal_eval(expected), code
-        checked += 1
-    return checked
-
-
-def renew(page: Path) -> None:
-    """Write what the commands of a page print today into it."""
-
-    def renewed(match: re.Match[str]) -> str:
+    def replaced(match: re.Match[str]) -> str:
         return f"{match['head']}{Shown(page, match['command'], match['printed'], match['parts']).today()}```"
 
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         prepare(page, Path(folder))
-        text = CONSOLE.sub(renewed, read(page))
-    if text != read(page):
-        page.write_text(text, encoding="utf-8")
-        print(f"{page.relative_to(ROOT)}: renewed")
-
-
-def take_picture(width: int = 1000, highest: int = 3000) -> None:
-    """Take a picture of the first screen of the certificate, above its figures [pixels]."""
-    from PIL import Image, ImageChops
-
-    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if browser is None:
-        sys.exit("no Chromium found: install it, or leave --picture out")
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        CliRunner().invoke(cli, [*shlex.split(PICTURED), "--html", "page.html"], catch_exceptions=False)
-        html = Path("page.html").read_text(encoding="utf-8")
-        Path("page.html").write_text(html[: html.index("<h2>Figures</h2>")], encoding="utf-8")
-        options = ["--headless", "--no-sandbox", "--hide-scrollbars", f"--window-size={width},{highest}", "--screenshot=page.png"]
-        subprocess.run([browser, *options, Path("page.html").resolve().as_uri()], check=True, capture_output=True)
-        with Image.open("page.png") as opened:
-            taken = opened.convert("RGB")
-    box = ImageChops.difference(taken, Image.new("RGB", taken.size, "white")).getbbox()
-    assert box is not None, "the page is empty"
-    taken.crop((0, 0, width, min(box[3] + 16, highest))).quantize(64).save(PICTURE, optimize=True)
-    print(f"{PICTURE.relative_to(ROOT)}: taken")
-
-
-def main() -> None:
-    """Renew all pages and, where asked for, the picture."""
-    from tests.test_docs_conversion import write_tables  # it imports this module
-
-    write_tables()
-    for page in PAGES:
-        renew(page)
-    if "--picture" in sys.argv[1:]:
-        take_picture()
-
-
-if __name__ == "__main__":
-    main()
+        return CONSOLE.sub(replaced, text)

@@ -1,18 +1,13 @@
-"""How each card's emulation was verified, as a table for ``docs/emulation.md``; it is generated from the cards' evidence.
-
-``python -m pidemu.card.emulation`` writes the file; a test compares it with the cards.
-"""
+"""How each card's emulation was verified: ``docs/emulation.md``, made from the cards' evidence."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 from pidemu.card.base import Evidence, Status
 from pidemu.card.library import cards, load_card
 from pidemu.card.load import EMULATION, Card, variants
 
-FILE: Final = Path(__file__).resolve().parents[3] / "docs" / "emulation.md"
 _HOW: Final = {
     Status.MEASURED: "against the real implementation",
     Status.DOCUMENTED: "against the published scan equation",
@@ -22,7 +17,7 @@ _HOW: Final = {
 _HEAD: Final = """\
 # How the emulations were verified
 
-Generated from the cards' evidence by `python -m pidemu.card.emulation`; do not edit. What the words mean:
+Generated from the cards' evidence by `python -m tools.regenerate`; do not edit. What the words mean:
 
 - **against the real implementation**: a test compares the card's outputs, scan by scan, with outputs of the real thing;
 - **against the published scan equation**: a test compares them with a computation of its own, written from the scan equation or the
@@ -36,7 +31,7 @@ its limits, and a transfer that is called bumpless is.
 """
 
 
-def table() -> str:
+def text() -> str:
     """Return the page: one row per card, and what each card assumes of its scan-by-scan behaviour."""
     found = [load_card(name) for name in cards()]
     rows = [(card.id, _HOW[e.status], e.at or "", e.note or "") for card in found if (e := card.data.evidence.get(EMULATION))]
@@ -65,7 +60,3 @@ def _assumed(card: Card) -> list[str]:
             if not statement.makes_the_law and statement.evidence is not None:
                 entries.setdefault(statement.key, statement.evidence)
     return [f"`{key}`" for key in entries]
-
-
-if __name__ == "__main__":
-    FILE.write_text(table(), encoding="utf-8")
