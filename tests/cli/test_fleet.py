@@ -398,7 +398,6 @@ OVERLAPPING = {
     "--parquet o.pq --table o.pq.parts/o.csv": (
         "--table o.pq.parts/o.csv lies in the parts of --parquet o.pq, where nothing else may be written; give another place"
     ),
-    "--signals ": "--signals '' names no folder; give one",
 }
 
 
