@@ -70,7 +70,8 @@ class Fleet:
         """Run every loop from rest, as `pidemu.simulate` does, and with its numbers.
 
         A loop that cannot be run is reported in the result and does not stop the others. Where the run is interrupted (Ctrl-C),
-        what is done by then is returned, and an older Parquet file is not replaced (``NAME.interrupted.EXT``). Where signals go to files, a run that did not end, whatever ended it, can be gone on with.
+        what is done by then is returned, and an older Parquet file is not replaced (``NAME.interrupted.EXT``).
+        Where signals go to files, a run that did not end, whatever ended it, can be gone on with.
 
         Parameters
         ----------
