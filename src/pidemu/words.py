@@ -13,7 +13,6 @@ from pidemu.plausible import plain_number
 from pidemu.ranges import RANGES, read_range
 from pidemu.units import Role, parse_quantity, to_canonical
 
-
 _SEVERAL: Final = re.compile(r"[\s,;]\w+\s*=")
 """A value that another ``NAME=`` follows."""
 

@@ -28,6 +28,7 @@ from pidemu.cli.happened import tell
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
+from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.plain import json_safe
 from pidemu.plausible import plain_number
@@ -124,7 +125,7 @@ def command(
     for note in (*skipped, *settings.notes, *_notes(record, controller, when, bias, bounds, kind), *left):
         echo(f"note: {note}", err=True)
     uneven = "" if when.interval is None else ", as the intervals were recorded"
-    echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
+    echo(f"{counted(len(emulated), 'scan')} of {number(controller.interval)} s{uneven}, {action} acting", err=True)
     if engine is not None:
         echo(f"engine: {controller.engine}", err=True)
     if not as_json:
