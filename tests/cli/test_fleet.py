@@ -333,3 +333,10 @@ def test_cores_and_a_scheduler_are_one_too_many() -> None:
     status, out, err = said("fleet", "good.csv", "--cores", "2", "--scheduler", "tcp://127.0.0.1:8786")
     assert (status, out) == (2, "")
     assert err.endswith("Error: --cores is for this machine, and --scheduler runs the loops elsewhere; leave one of them out\n")
+
+
+@pytest.mark.parametrize("time", ["-5", "0", "-1 min"])
+def test_a_time_that_is_none_is_wrong_usage_and_no_fault_of_the_rows(time: str) -> None:
+    status, out, err = said("fleet", "good.csv", "--time", time)
+    message = f"Error: Invalid value for '--time': '{time}' is not more than 0 s; write a time such as 0.5 or 10 min"
+    assert (status, out, err.splitlines()[-1]) == (2, "", message)
