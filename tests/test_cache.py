@@ -272,7 +272,8 @@ def test_a_shared_object_of_another_in_a_shared_folder_is_never_loaded(tmp_path:
     subprocess.run([*native.compiler(), "-shared", "-fPIC", "-o", str(folder / "bait.so"), str(source)], check=True)
     data = (folder / "bait.so").read_bytes()
     code = (
-        "import hashlib, pathlib, pidemu; from pidemu import cache; from pidemu.targets import native\n"
+        "import hashlib, pathlib, pidemu\n"
+        "from pidemu.targets import native\n"
         "real = native.load\n"
         f"data = pathlib.Path({str(folder / 'bait.so')!r}).read_bytes()\n"
         "def load(stem, suffix):\n"  # whoever puts the file there knows what it is to be called

@@ -214,7 +214,7 @@ def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(
 
 
 @pytest.mark.parametrize("engine", EVERY_ENGINE)
-@pytest.mark.parametrize("lags", [11, 12, 30])
+@pytest.mark.parametrize("lags", [11, 12, 20])
 def test_a_process_of_many_lags_has_the_numbers_of_the_emulator_scan_by_scan(engine: Engine, lags: int) -> None:
     process = Process.from_lags(1.0, [1 + i / 3 for i in range(lags)], delay=2.25)
     made = trial(alike(1)[0].settings, process, 0.5, time=60)

@@ -363,7 +363,10 @@ NOT_YAML: dict[str, Case] = {
     ),
     "an alias": (
         (("form: standard", "form: &f standard"), ("implementation: positional", "implementation: *f")),
-        ("8:17: alias '*f' is not used in cards; write the value out",),
+        (
+            "7:7: anchor '&f' is not used in cards; remove it",
+            "8:17: alias '*f' is not used in cards; write the value out",
+        ),
     ),
     "a tag": (
         ("form: standard", "form: !!str standard"),

@@ -34,7 +34,7 @@ RULES = "INTEGRAL_RULE=backward, DERIVATIVE_RULE=backward"
 def test_differences_are_stated_overall_and_by_part_of_the_record() -> None:
     out = told("compare", *A, *B)
     assert out.splitlines()[:4] == [
-        "standard record: 1360 scans, 1359 s; moves of 4 %, 40 s each",
+        "standard record: 1,360 scans, 1359 s; moves of 4 %, 40 s each",
         "  card                  scan  settings",
         "  generic/standard       1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=1, c=1, " + RULES,
         "  generic/standard (2)   1 s  K=2 %/%, Ti=40 s, Td=0 s, Tf=0 s, b=0.5, c=1, " + RULES,

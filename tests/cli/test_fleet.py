@@ -413,3 +413,10 @@ def test_the_index_of_a_folder_of_signals_is_not_overwritten_by_a_table(folder: 
     before = (folder / "s" / "signals.csv").read_bytes()
     assert said("fleet", "good.csv", "--signals", "s", "--resume", "--table", "s/signals.csv").status == 2
     assert (folder / "s" / "signals.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("time", ["-5", "0", "-1 min"])
+def test_a_time_that_is_none_is_wrong_usage_and_no_fault_of_the_rows(time: str) -> None:
+    status, out, err = said("fleet", "good.csv", "--time", time)
+    message = f"Error: Invalid value for '--time': '{time}' is not more than 0 s; write a time such as 0.5 or 10 min"
+    assert (status, out, err.splitlines()[-1]) == (2, "", message)

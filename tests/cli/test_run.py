@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import itertools
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import pidemu
+from pidemu.cli import main
 from tests.cli.helpers import Said, said, strict_json
 
 PI_SETTINGS = pidemu.load_card("generic/standard").settings(K=2, Ti=10)
@@ -453,3 +455,17 @@ def test_the_choice_of_the_engine_is_told_with_its_reason(folder: Path) -> None:
     assert err.splitlines()[1] == "engine: python (too short to be worth a call into compiled code)"
     found = strict_json(recorded(folder, RECORD, "--json").out)
     assert found["engine"] == {"name": "python", "reason": "too short to be worth a call into compiled code"}
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_what_a_record_hides_is_written_out_on_a_terminal_and_kept_in_a_pipe(terminal: bool, tmp_path: Path) -> None:
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return terminal
+
+    (tmp_path / "r.csv").write_text("sp,pv,note\n50,49,a\u202eb\u200bc\n", encoding="utf-8")
+    screen, words = Screen(), ["run", "fisher/provox", "GAIN=2", "RESET=4", "--record", str(tmp_path / "r.csv"), "--scan", "1"]
+    with contextlib.redirect_stdout(screen), pytest.raises(SystemExit):
+        main(words)
+    expected = "50,49,a\\u202eb\\u200bc,0.0" if terminal else "50,49,a\u202eb\u200bc,0.0"
+    assert screen.getvalue().splitlines()[1] == expected

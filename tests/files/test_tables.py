@@ -69,3 +69,28 @@ def test_a_table_has_the_columns_of_its_header(tmp_path: Path) -> None:
     rows: list[dict[str, Any]] = [{"tag": "=1+1", "x": -0.1, "other": 1}, {"tag": "b", "x": None}]
     write_table(tmp_path / "t.csv", ["tag", "x"], rows, FleetError)
     assert (tmp_path / "t.csv").read_bytes() == b"tag,x\r\n'=1+1,-0.1\r\nb,\r\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "delimiter"),
+    [
+        ("sp,pv\n1;2\n", ","),
+        ("sp;pv\n1,5;2\n", ";"),
+        ("# a,b,c\nsp\tpv\n1\t2\n", "\t"),
+        ("sep=;\nsp;pv\n", ";"),
+        ('"sep=\t"\nsp,pv\n', "\t"),
+        ("SEP=,\nsp;a,pv\n", ","),
+        ("sp\n1\n", ","),
+        ("", ","),
+    ],
+)
+def test_the_header_or_a_line_above_it_says_what_separates_the_cells(text: str, delimiter: str) -> None:
+    lines = split_lines(text)
+    assert lines.delimiter == delimiter
+    assert not any("sep=" in line.casefold() for _, line in lines.rows)
+
+
+def test_a_row_of_empty_cells_is_skipped_only_where_that_moves_no_other() -> None:
+    text = "sp\tpv\n\t\n1\t2\n"
+    assert [number for number, _ in split_lines(text).rows] == [1, 2, 3]
+    assert [number for number, _ in split_lines(text, skip_empty_rows=True).rows] == [1, 3]

@@ -105,7 +105,7 @@ WRONG = {
         "fisher/provox: RESET: missing; it sets the integral (reset rate), in repeat/min"
     ),
     "A,generic/standard,K=2; K=3,gain=1,,,,,,": "K is given twice, 2 and 3; give it once",
-    "A,generic/standard,K 2,gain=1,,,,,,": "'K 2' is not NAME=VALUE; write for example GAIN=2 or \"RESET=20 s/repeat\"",
+    "A,generic/standard,K 2,gain=1,,,,,,": "'K 2' is not NAME=VALUE; write for example GAIN=2; RESET=20 s/repeat",
     "A,bailey/fc19,pv_range=5,gain=1,,,,,,": ("'5' is not a range; write low and high with a unit, such as \"0,400 degC\""),
     "A,generic/standard,K=2; Ti=10,lag=3,,,,,,": "'lag=3' has no gain; add gain=1.5, for example",
     "A,generic/standard,K=2; Ti=10,gain=1,fast,,,,,": (
@@ -135,7 +135,7 @@ WRONG = {
 }
 
 WRONG["A" * 200_000] = "a cell has more than 131,072 characters; shorten it"
-WRONG["# FIC-2 is out of service"] = "1 cells, the header has 10; comments stand above the header"
+WRONG["# FIC-2 is out of service"] = "1 cell, the header has 10; comments stand above the header"
 WRONG["#REF!,generic/standard,K=2; Ti=10,,,,,,,"] = "no process; every loop needs one"
 WRONG["A\x00,generic/standard,K=2; Ti=10,gain=1,,,,,,"] = "column 2: U+0000, NUL, stands in the text; remove it"
 WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,,,\u2028B,,"] = "column 43: U+2028, a line separator, stands in the text; remove it"

@@ -96,7 +96,7 @@ def test_without_a_column_the_recorded_output_is_the_operator_s(tmp_path: Path) 
         ("sp,pv\nbad,2\n", ":2: column sp: 'bad' is not a number"),
         ("sp,pv\n1,2\n#REF!,2\n", ":3: column sp: '#REF!' is not a number"),
         ("sp,pv\n1,2\n# 1,2\n", ":3: column sp: '# 1' is not a number"),
-        ("sp,pv\n1,2\n# out of service\n", ":3: 1 cells, the header has 2; comments stand above the header"),
+        ("sp,pv\n1,2\n# out of service\n", ":3: 1 cell, the header has 2; comments stand above the header"),
         ("sp,pv\n1,1_0\n", f":2: column pv: '1_0' {ONLY}"),
         ("sp,pv\n1,٣\n", f":2: column pv: '٣' {ONLY}"),
         ("sp,pv\n1,0x10\n", ":2: column pv: '0x10' is not a number"),
@@ -156,3 +156,19 @@ def test_new_columns_are_written_behind_the_cells_as_they_stand(tmp_path: Path) 
     stream = io.StringIO()
     write_record(record, {"x": [0.1, 1 / 3], "y": [1, np.float64(2)]}, stream)
     assert stream.getvalue() == f'sp,pv,note,x,y\n1.50,2,"a, b",0.1,1.0\n1,2,,{1 / 3!r},2.0\n'
+
+
+@pytest.mark.parametrize("text", ["sp;pv\n1.5;2\n", "sp\tpv\n1.5\t2\n", "sep=;\nsp;pv\n1.5;2\n"])
+def test_semicolons_and_tabs_separate_cells_as_in_lists_of_loops(tmp_path: Path, text: str) -> None:
+    record = read(tmp_path, text)
+    assert (values(record.sp), values(record.pv)) == ([1.5], [2])
+
+
+def test_a_decimal_comma_between_semicolons_is_named_with_its_remedy(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match=r":2: column sp: '1,5' has a comma; write a decimal point$"):
+        read(tmp_path, "sp;pv\n1,5;2,5\n3,5;2\n")
+
+
+def test_a_header_behind_a_comment_sign_is_told_to_lose_it(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match=r":1: no column 'sp' among #sp, pv; remove the # of '#sp'$"):
+        read(tmp_path, "#sp,pv\n1,2\n")

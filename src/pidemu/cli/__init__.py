@@ -71,7 +71,8 @@ def cli() -> None:
     """What a PID setting means on whose controller.
 
     Emulates the PID algorithms of industrial controllers and converts settings between them, with proof.
-    Exit status: 0; 1 for a refusal or a failed check; 2 for wrong usage; 130 after Ctrl-C, 143 after SIGTERM.
+    Exit status: 0; 1 for a refusal, a question, a wrong card or loop file, a failed check or loop, a changed certificate; 2 for
+    options, settings or files that cannot be used; 130 after Ctrl-C, 143 after SIGTERM.
     """
 
 

@@ -87,14 +87,26 @@ class Range(_RangeType):
 
 
 class Time(_TimeType):
-    """A time, in seconds or with a unit."""
+    """A time, in seconds or with a unit.
+
+    Parameters
+    ----------
+    positive : bool
+        Whether it must be more than zero.
+    """
 
     name = "TIME"
+
+    def __init__(self, positive: bool = False) -> None:
+        self._positive = positive
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read the time [s]."""
         try:
-            return seconds(str(value))
+            time = seconds(str(value))
+            if self._positive and not 0 < time < math.inf:
+                raise SettingError(f"'{value}' is not more than 0 s; write a time such as 0.5 or 10 min")
+            return time
         except SettingError as error:
             self.fail(str(error), param, ctx)
 

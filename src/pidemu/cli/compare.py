@@ -28,6 +28,7 @@ from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.comparison.compare import Comparison, compare
 from pidemu.comparison.side_by_side import dials
 from pidemu.errors import RecordError
+from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.record.files import SIGNALS, Record, write_record
 from pidemu.record.playback import NO_BUMP
@@ -178,7 +179,7 @@ def _print(c: Comparison, file: str | None) -> None:
 
 def _title(c: Comparison, file: str | None) -> str:
     record, count = c.record, len(c.times)
-    length = f"{count} scans, {number(c.times[-1] - c.times[0])} s"
+    length = f"{counted(count, 'scan')}, {number(c.times[-1] - c.times[0])} s"
     if not isinstance(record, StandardRecord):
         return f"{file}: {length}"
     return f"standard record: {length}; moves of {_percent(record.size)} %, {number(record.characteristic_time)} s each"

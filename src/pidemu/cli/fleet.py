@@ -47,7 +47,9 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 
 @click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
 @click.argument("file", metavar="LOOPS.csv")
-@click.option("--time", type=Time(), help="Length of the run, for loops that state none; by default until each has settled.")
+@click.option(
+    "--time", type=Time(positive=True), help="Length of the run, for loops that state none; by default until each has settled."
+)
 @setpoint_option
 @load_option
 @engine_option

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ from pidemu.cli.happened import tell
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.emulator import Controller
 from pidemu.errors import RecordError, SettingError, suggest
+from pidemu.excerpt import printable
+from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.plain import json_safe
 from pidemu.plausible import plain_number
@@ -124,7 +127,7 @@ def command(
     for note in (*skipped, *settings.notes, *_notes(record, controller, when, bias, bounds, kind), *left):
         echo(f"note: {note}", err=True)
     uneven = "" if when.interval is None else ", as the intervals were recorded"
-    echo(f"{len(emulated)} scans of {number(controller.interval)} s{uneven}, {action} acting", err=True)
+    echo(f"{counted(len(emulated), 'scan')} of {number(controller.interval)} s{uneven}, {action} acting", err=True)
     if engine is not None:
         echo(f"engine: {controller.engine}", err=True)
     if not as_json:
@@ -190,7 +193,10 @@ def _plain(controller: Controller, record: Record, playback: Playback) -> dict[s
 
 def _write(record: Record, emulated: Floats, target: str | None, read: Sequence[str | Path]) -> None:
     if target is None:
-        write_record(record, {"emulated": emulated}, sys.stdout)
+        shown = io.StringIO()
+        write_record(record, {"emulated": emulated}, shown)
+        text = shown.getvalue()
+        sys.stdout.write(printable(text) if sys.stdout.isatty() else text)
         return
     with beside(target, RecordError, read) as stream:
         write_record(record, {"emulated": emulated}, stream)

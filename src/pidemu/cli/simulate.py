@@ -32,6 +32,7 @@ from pidemu.cli.common import (
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.engines import Choice, checked
 from pidemu.errors import RecordError
+from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
 from pidemu.loop.outcome import has_settled, margins_of, stability_of
@@ -175,7 +176,7 @@ def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], mar
     heading("\nThe loop")
     rows = [
         ["process", made.process.text],
-        ["scan", f"{number(made.scan)} s, {made.scans:,} scans"],
+        ["scan", f"{number(made.scan)} s, {counted(made.scans, 'scan')}"],
         ["action", made.action],
         ["output limits", f"{number(low)} to {number(high)} %"],
         ["setpoint step", _step(made.setpoint_step)],

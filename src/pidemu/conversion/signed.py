@@ -19,6 +19,8 @@ from pidemu.files.reading import Kind, read_text
 
 LARGEST: Final = 16 * 2**20
 """Size of a file beyond which it is not read [bytes]; a certificate has some 50 kB."""
+_MOST_DIGITS: Final = 400
+"""More than the largest number has that a computer works with."""
 _AGAIN: Final = "write the certificate again with 'pidemu convert ... --json'"
 _KIND: Final = Kind("a certificate", _AGAIN, LARGEST)
 
@@ -54,7 +56,7 @@ def _parsed(name: str, text: str) -> Any:
     if not text.strip():
         raise CertificateError(f"{name}: the file is empty; {_AGAIN}")
     try:
-        return json.loads(text, parse_constant=_refuse, object_pairs_hook=_once)
+        return json.loads(text, parse_int=_integer, parse_constant=_refuse, object_pairs_hook=_once)
     except json.JSONDecodeError as error:
         cut = error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated")
         what = "the file ends in the middle" if cut else f"not JSON: {error.msg[0].lower()}{error.msg[1:]}"
@@ -62,18 +64,24 @@ def _parsed(name: str, text: str) -> Any:
     except RecursionError:
         raise CertificateError(f"{name}: nested too deeply for a certificate; {_AGAIN}") from None
     except ValueError as error:
-        raise CertificateError(f"{name}: not JSON: {error}; {_AGAIN}") from None
+        raise CertificateError(f"{name}: {error}; {_AGAIN}") from None
+
+
+def _integer(digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise ValueError(f"a number of {len(digits):,} digits")
+    return int(digits)
 
 
 def _refuse(word: str) -> NoReturn:
-    raise ValueError(f"{word} is not a number in JSON")
+    raise ValueError(f"not JSON: {word} is not a number in JSON")
 
 
 def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"the key '{quoted(key)}' stands twice in one place")
+            raise ValueError(f"not JSON: the key '{quoted(key)}' stands twice in one place")
         found[key] = value
     return found
 

@@ -17,6 +17,10 @@ _FORMULA: Final = re.compile("'*[=+\\-@\t\r\uff1d\uff0b\uff0d\uff20]")
 """A cell that a spreadsheet may compute; behind apostrophes it is text."""
 
 
+_DELIMITERS: Final = ",;\t"
+_SEPARATOR: Final = re.compile(f'"?sep=([{_DELIMITERS}])"?[{_DELIMITERS}]*', re.IGNORECASE)
+
+
 @dataclass(frozen=True, slots=True)
 class Lines:
     """The lines of a file with a header.
@@ -29,44 +33,54 @@ class Lines:
         The header and the rows, with their lines in the file, counted from 1.
     blank : int
         How many empty lines stand among them.
+    delimiter : str
+        What separates the cells: a comma, a semicolon or a tab, whichever the header has most of, or what a first line such as
+        ``sep=;`` says, which spreadsheets write.
     """
 
     comments: tuple[str, ...]
     rows: tuple[tuple[int, str], ...]
     blank: int
+    delimiter: str = ","
 
     @property
     def skipped(self) -> str:
         """What is not read, in words; empty where everything is."""
         parts = []
         if self.comments:
-            parts.append(f"{_count(len(self.comments), 'comment line')} above the header")
+            parts.append(f"{counted(len(self.comments), 'comment line')} above the header")
         if self.blank:
-            parts.append(_count(self.blank, "empty line"))
+            parts.append(counted(self.blank, "empty line"))
         return f"skipped: {' and '.join(parts)}" if parts else ""
 
 
-def split_lines(text: str, empty: str = " \t") -> Lines:
+def split_lines(text: str, *, skip_empty_rows: bool = False) -> Lines:
     """Return the lines of a text: comments, header and rows; only above the header a line can be a comment.
 
     Parameters
     ----------
     text : str
         The text, as `pidemu.files.reading.read_text` returns it.
-    empty : str
-        Characters that say nothing: a line of these alone is skipped.
+    skip_empty_rows : bool
+        Whether rows of which no cell says anything are skipped, as empty lines are.
     """
     comments: list[str] = []
     rows: list[tuple[int, str]] = []
     blank = 0
+    delimiter, empty = "", " \t"
     for number, line in enumerate(text.removesuffix("\n").split("\n") if text else (), 1):
-        if not rows and (line.startswith("# ") or line.rstrip() == "#"):
+        if number == 1 and (said := _SEPARATOR.fullmatch(line)):
+            delimiter = said[1]
+        elif not rows and (line.startswith("# ") or line.rstrip() == "#"):
             comments.append(line)
         elif line.strip(empty):
+            if not rows:
+                delimiter = delimiter or max(_DELIMITERS, key=line.count)
+                empty = f" \t{_DELIMITERS}" if skip_empty_rows else empty.replace(delimiter, "")
             rows.append((number, line))
         else:
             blank += 1
-    return Lines(tuple(comments), tuple(rows), blank)
+    return Lines(tuple(comments), tuple(rows), blank, delimiter or _DELIMITERS[0])
 
 
 def split_row(line: str, delimiter: str = ",") -> list[str]:
@@ -164,5 +178,6 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _count(n: int, what: str) -> str:
+def counted(n: int, what: str) -> str:
+    """Return a number of things in words: ``1 cell``, ``2,000 cells``."""
     return f"{n:,} {what}{'' if n == 1 else 's'}"

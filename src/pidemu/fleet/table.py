@@ -11,7 +11,7 @@ from pidemu.card.library import folders, load_card_by_id, loaded_files
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
-from pidemu.files.tables import Lines, split_lines, split_row, write_table
+from pidemu.files.tables import Lines, counted, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import reason_of
 from pidemu.fleet.result import HEADER, FleetResult
@@ -23,6 +23,7 @@ COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limit
 """Columns of a file of loops."""
 _REQUIRED: Final = COLUMNS[:4]
 _KIND: Final = Kind("a table of loops", "save it as CSV text in UTF-8, with a header line such as tag,card,settings,process")
+_DELIMITER: Final = {",": "','", ";": "';'", "\t": "a tab"}
 _ACTIONS: Final[Mapping[str, Action]] = {"reverse": "reverse", "direct": "direct"}
 
 
@@ -113,8 +114,8 @@ class LoopTable:
 def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTable:
     """Read a CSV file of loops: a header line, a row per loop; lines above these that begin with ``# `` are comments.
 
-    The cells are separated by commas, or by semicolons where the header line has these. Columns, in any order: ``tag``, ``card``,
-    ``settings`` (``GAIN=2; RESET=4; RATE=6 s``: dials in the card's units or with one, and options, by the card's names),
+    The cells are separated by commas, or by semicolons or tabs where the header line has these. Columns, in any order: ``tag``,
+    ``card``, ``settings`` (``GAIN=2; RESET=4; RATE=6 s``: dials in the card's units or with one, and options, by the card's names),
     ``process`` (``gain=1, lag=20, delay=3``, see `pidemu.loop.process.parse_process`), and, where they are there, ``scan`` [s],
     ``action`` (reverse, direct), ``limits`` of the output [%] (``0,100``), ``setpoint`` and ``load`` (size of a step [%], or when
     [s] and size: ``60,5``) and ``time`` [s]. What an empty cell does not say, the fleet decides.
@@ -141,7 +142,7 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
     folders(vendors)  # one that is not there is no fault of a row
     lines = _lines(path)
     (head, names), *rows = lines.rows
-    delimiter = ";" if names.count(";") > names.count(",") else ","
+    delimiter = lines.delimiter
     try:
         header = _header(_cells(names, delimiter))
     except FleetError as error:
@@ -156,9 +157,9 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
             cells = _cells(line, delimiter)
             row = {name: cell for name, cell in zip(header, cells, strict=False) if cell}
             if len(cells) != len(header):
-                remedy = f"put a cell that holds '{delimiter}' in quotation marks"
+                remedy = f"put a cell that holds {_DELIMITER[delimiter]} in quotation marks"
                 remedy = "comments stand above the header" if cells[0].startswith("#") and len(cells) == 1 else remedy
-                raise FleetError(f"{len(cells)} cells, the header has {len(header)}; {remedy}")
+                raise FleetError(f"{counted(len(cells), 'cell')}, the header has {len(header)}; {remedy}")
             loops.append(_loop(row, number, seen, vendors))
             numbers.append(number)
         except Exception as error:  # whatever it is: one wrong row among thousands stops no other
@@ -169,7 +170,7 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
 
 def _lines(path: str | Path) -> Lines:
     """Return the lines of a file; a control character, or a byte that is not UTF-8, costs its row only."""
-    lines = split_lines(read_text(path, FleetError, _KIND, by_line=True), empty=" \t,;")
+    lines = split_lines(read_text(path, FleetError, _KIND, by_line=True), skip_empty_rows=True)
     if len(lines.rows) < 2:
         wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
         raise FleetError(f"{visible(str(path))}: no loops; {wanted}")

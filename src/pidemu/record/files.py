@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pidemu.errors import RecordError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, read_text
-from pidemu.files.tables import split_lines, split_row, write_rows
+from pidemu.files.tables import counted, split_lines, split_row, write_rows
 from pidemu.plausible import plain_number
 
 Floats = npt.NDArray[np.float64]
@@ -109,6 +109,8 @@ class Record:
 def read_record(path: str | Path) -> Record:
     """Read a CSV file with a header line; lines above it that begin with ``# ``, or are just ``#``, are comments.
 
+    The cells are separated by commas, or by semicolons or tabs where the header line has these.
+
     Columns are found by name, in any case: ``sp``, ``pv``, ``time`` (or ``t``: seconds or timestamps), ``auto``, ``manual`` (or
     ``man``), ``output`` (or ``out``, ``op``), ``cascade`` (or ``cas``, ``rsp``), ``track``, ``external_reset``, ``feedforward`` (or
     ``ff``), ``hold``, ``interval`` (or ``dt``); others are kept and ignored. Numbers are written with the digits 0 to 9 and a
@@ -128,13 +130,13 @@ def read_record(path: str | Path) -> Record:
     shown = visible(str(path))
     if len(lines.rows) < 2:
         raise RecordError(f"{shown}: no samples; a record has a header line such as sp,pv and one line per scan")
-    table = [(i, _row(f"{shown}:{i}", line)) for i, line in lines.rows]
+    table = [(i, _row(f"{shown}:{i}", line, lines.delimiter)) for i, line in lines.rows]
     header = table[0][1]
     places = _places(shown, table[0][0], header)
     for i, row in table[1:]:
         if len(row) != len(header):
             remark = "; comments stand above the header" if row[0].startswith("#") else ""
-            raise RecordError(f"{shown}:{i}: {len(row)} cells, the header has {len(header)}{remark}")
+            raise RecordError(f"{shown}:{i}: {counted(len(row), 'cell')}, the header has {len(header)}{remark}")
     columns: dict[str, Floats] = {}
     for name, at in places.items():
         cells = [(f"{shown}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
@@ -149,9 +151,9 @@ def read_record(path: str | Path) -> Record:
     )
 
 
-def _row(where: str, line: str) -> list[str]:
+def _row(where: str, line: str, delimiter: str) -> list[str]:
     try:
-        return split_row(line)
+        return split_row(line, delimiter)
     except ValueError as error:
         raise RecordError(f"{where}: {error}") from None
 
@@ -166,9 +168,10 @@ def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
             places[name] = hits[0]
     for name in ("sp", "pv"):
         if name not in places:
-            split = "; the cells are separated by semicolons, save the file with commas" if ";" in "".join(header) else ""
             among = quoted(", ".join(header), 200)
-            raise RecordError(f"{path}:{line}: no column '{name}' among {among}{suggest(name, header)}{split}")
+            marked = next((cell for cell in header if cell.startswith("#") and cell[1:].strip().casefold() in _COLUMNS[name]), None)
+            hint = suggest(name, header) if marked is None else f"; remove the # of '{quoted(marked)}'"
+            raise RecordError(f"{path}:{line}: no column '{name}' among {among}{hint}")
     return places
 
 
