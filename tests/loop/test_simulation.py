@@ -14,14 +14,16 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.certificate.figures import loop_rows
-from pidemu.engines import Choice
+from pidemu.engines import Choice, Engine
 from pidemu.errors import ProcessError, UndefinedError
 from pidemu.loop.figures import crossover, loop_figures, scan_for
 from pidemu.loop.hold import Plant
 from pidemu.loop.load_response import continuous_load_iae, load_iae
-from pidemu.loop.process import Process
-from pidemu.loop.simulation import Simulation, compare_loops, simulate
+from pidemu.loop.process import Process, parse_process
+from pidemu.loop.simulation import Simulation, compare_loops, run_trial, simulate
+from pidemu.loop.trial import trial
 from pidemu.settings import Settings
+from tests.fleet.support import EVERY_ENGINE
 
 Floats = npt.NDArray[np.float64]
 WIDE = (-1e9, 1e9)
@@ -338,3 +340,14 @@ def test_a_loop_whose_polynomials_lose_a_term_has_figures(process: Process, dial
         assert found.source.iae > 0 or math.isnan(found.source.iae)
         assert found.source.stable or found.source.iae == math.inf or not any(dials.values())
     assert crossover(settings.law().response, process, 1.0) is None or dials
+
+
+@pytest.mark.parametrize("engine", EVERY_ENGINE)
+def test_a_dead_time_that_is_longer_than_the_run_is_run_by_every_engine(engine: Engine) -> None:
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=6)
+    made = trial(settings, parse_process("gain=3,delay=4"), time=1)
+    pv, out, _ = run_trial(made, engine)
+    expected_pv, expected_out, _ = run_trial(made, "python")
+    assert np.array_equal(pv, expected_pv)
+    assert np.array_equal(out, expected_out)
+    assert set(pv.tolist()) == {50.0}

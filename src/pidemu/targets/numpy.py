@@ -134,18 +134,18 @@ def runner(program: Program) -> Runner:
 def _over(program: Program) -> Run:
     run_block = block(program.structure)
     values = np.array(program.values, dtype=np.float64)[:, None]
-    lengths = np.array(program.lengths, dtype=np.int64)[:, None]
 
     def run(state: list[Any], signals: Sequence[Floats], scans: int) -> Floats:
         count = len(program.states)
         states = np.array(state[:count], dtype=np.float64)[:, None]
-        rings = np.zeros((len(lengths), 1 + max(program.lengths, default=0), 1))
-        places = [np.arange(-length, 0) for length in program.lengths]
+        lengths = [len(line) for line in state[count:]]  # a dead time that is longer than the run is held in part only
+        rings = np.zeros((len(lengths), 1 + max(lengths, default=0), 1))
+        places = [np.arange(-length, 0) for length in lengths]
         for ring, held, place in zip(rings, state[count:], places, strict=True):
             ring[place, 0] = held
         inputs = np.array(signals, dtype=np.float64).reshape(len(signals), scans, 1)
         records = np.empty((len(program.recorded), scans, 1))
-        run_block(values, states, inputs, rings, lengths, 0, records)
+        run_block(values, states, inputs, rings, np.array(lengths, dtype=np.int64)[:, None], 0, records)
         state[:count] = [in_precision(program, q.name, x) for q, x in zip(program.states, states[:, 0].tolist(), strict=True)]
         for ring, held, place, line in zip(rings, state[count:], places, program.lines, strict=True):
             held.clear()
