@@ -338,9 +338,16 @@ class TestWhatIsTakenForGranted:
         found = convert("fisher/provox", PROVOX, "emerson/deltav", bias=40)
         assert "The bias of 40 % is not used: the integral action finds the output at SP = PV." in found.warnings
 
-    @pytest.mark.parametrize("limits", [(90, 10), (10, 10), (math.nan, 10)])
-    def test_limits_have_the_lower_one_first(self, limits: tuple[float, float]) -> None:
-        with pytest.raises(SettingError, match="give the lower limit first"):
+    @pytest.mark.parametrize(
+        ("limits", "message"),
+        [
+            ((90, 10), "give the lower limit first"),
+            ((10, 10), "give the lower limit first"),
+            ((math.nan, 10), "limits is nan; give a finite number"),
+        ],
+    )
+    def test_limits_have_the_lower_one_first(self, limits: tuple[float, float], message: str) -> None:
+        with pytest.raises(SettingError, match=message):
             convert("fisher/provox", PROVOX, "emerson/deltav", limits=limits)
 
     def test_compensation_needs_the_scans(self) -> None:
