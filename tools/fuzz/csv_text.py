@@ -81,10 +81,7 @@ def rows_in(content: bytes, is_empty: str) -> set[int]:
     is_empty : str
         Characters of which alone a line is empty.
     """
-    try:
-        decoded = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return set()
+    decoded = content.decode("utf-8-sig", "surrogateescape")  # a byte that is not UTF-8 costs its row
     lines = re.sub("\r+\n", "\n", decoded).split("\n")
     if "\n" not in decoded:
         lines = decoded.split("\r")
