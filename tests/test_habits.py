@@ -29,7 +29,7 @@ def test_what_is_listed_as_slow_is_there_and_holds_tests(entry: str) -> None:
 
 def test_a_file_is_slow_where_it_or_its_folder_is_listed() -> None:
     assert is_slow(FOLDER / "conversion" / "test_exact.py")
-    assert is_slow(FOLDER / "test_law.py")
+    assert is_slow(FOLDER / "test_docs.py")
     assert not is_slow(FOLDER / "test_units.py")
 
 
