@@ -80,4 +80,4 @@ def bare(session: nox.Session) -> None:
     """Run fast tests without any extra."""
     session.install("-e", ".", *WITHOUT_EXTRAS)
     session.run(*CONVERT)
-    session.run("pytest", "-m", "fast", "--ignore=tests/loop/test_process.py", *session.posargs)
+    session.run("pytest", "-m", "fast", "--ignore=tests/simulation/test_process.py", *session.posargs)

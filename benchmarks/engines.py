@@ -28,10 +28,10 @@ import simple_pid
 
 import pidemu
 from benchmarks.handwritten import CBlocks, H, Numbers, library, program, run_one, stepping
-from pidemu.engines import Engine, block, runner
-from pidemu.scan.program import Program
-from pidemu.targets.python import starting
-from pidemu.targets.runner import Run
+from pidemu.backends.choice import Engine, block, runner
+from pidemu.backends.python import starting
+from pidemu.backends.runner import Run
+from pidemu.program.ir import Program
 
 Floats = npt.NDArray[np.float64]
 Job = Callable[[], object]

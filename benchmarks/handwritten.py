@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 import pidemu
-from pidemu.algorithm import Gate
-from pidemu.loop.closed import closed_loop
-from pidemu.loop.experiment import Steps, experiment
-from pidemu.scan.build import build
-from pidemu.scan.program import Program
-from pidemu.scan.specialise import specialise
-from pidemu.targets.native import compiler
+from pidemu.algorithm.model import Gate
+from pidemu.backends.native import compiler
+from pidemu.program.builder import build
+from pidemu.program.ir import Program
+from pidemu.program.specialise import specialise
+from pidemu.simulation.closed import closed_loop
+from pidemu.simulation.experiment import Steps, experiment
 
 Floats = npt.NDArray[np.float64]
 FOLDER = Path(__file__).parent / "c"

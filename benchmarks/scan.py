@@ -13,7 +13,7 @@ import numpy as np
 import simple_pid
 
 import pidemu
-from pidemu.targets.python import compiled
+from pidemu.backends.python import compiled
 
 SCANS = 200_000
 ROUNDS = 7

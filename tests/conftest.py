@@ -23,7 +23,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from pidemu import cache
+from pidemu.backends import cache
 from tests.selection import FOLDER, is_slow
 
 settings.register_profile(
@@ -68,7 +68,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def no_code_yet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Give a folder for generated code in which there is none; this process knows of none either."""
-    from pidemu.targets import native, numba
+    from pidemu.backends import native, numba
 
     made = (numba._record_module, numba._block_module, native._compiled)
     monkeypatch.setenv("PIDEMU_CACHE", str(tmp_path / "code"))

@@ -12,17 +12,17 @@ import numpy.typing as npt
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Rule
+from pidemu.algorithm.model import Algorithm
+from pidemu.backends.python import compiled
+from pidemu.card.document import parse
 from pidemu.card.library import load_card
 from pidemu.card.load import Card, card_from
-from pidemu.card.models import Setting
+from pidemu.card.model.base import Rule
+from pidemu.card.model.card_file import Setting
 from pidemu.card.references import is_active
-from pidemu.card.source import parse
 from pidemu.errors import SettingError
-from pidemu.scan.program import Program
-from pidemu.settings import Settings, limits, off_values
-from pidemu.targets.python import compiled
+from pidemu.program.ir import Program
+from pidemu.settings.settings import Settings, limits, off_values
 from pidemu.units import Role, Spans, from_canonical, parse_unit
 
 Floats = npt.NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pidemu import Controller
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from tests.helpers import Floats
 
 _OPTIONAL = ("manual", "cascade", "track", "external_reset", "feedforward")

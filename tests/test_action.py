@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import pidemu
-from pidemu.action import ACTIONS, action_line, action_words, carried_action, check_action, read_action, switch_position
 from pidemu.errors import SettingError
+from pidemu.settings.action import ACTIONS, action_line, action_words, carried_action, check_action, read_action, switch_position
 from tests.helpers import made_up_card
 
 

@@ -19,11 +19,11 @@ import pidemu
 from pidemu.card.library import card_files
 from pidemu.errors import PidemuError
 from pidemu.explanation.explain import explain
-from pidemu.loop.outcome import margins_of
-from pidemu.loop.process import parse_process
-from pidemu.loop.simulation import run_trial
-from pidemu.loop.trial import trial
-from pidemu.settings import Settings
+from pidemu.process.process import parse_process
+from pidemu.settings.settings import Settings
+from pidemu.simulation.outcome import margins_of
+from pidemu.simulation.simulate import run_trial
+from pidemu.simulation.trial import trial
 
 CARDS = list(card_files())
 EXAMPLES = int(os.environ.get("PIDEMU_EXAMPLES", "25"))

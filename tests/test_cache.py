@@ -14,8 +14,7 @@ import platformdirs
 import pytest
 
 import pidemu
-from pidemu import cache
-from pidemu.targets import native
+from pidemu.backends import cache, native
 
 
 @pytest.fixture(autouse=True)
@@ -58,7 +57,7 @@ def in_another_process(**environment: str) -> Path:
             "-W",
             "error",
             "-c",
-            "import pidemu.cache as c; p = c.keep('a', '.b', b'x'); assert p.exists(); print(p)",
+            "import pidemu.backends.cache as c; p = c.keep('a', '.b', b'x'); assert p.exists(); print(p)",
         ],
         capture_output=True,
         text=True,
@@ -273,7 +272,7 @@ def test_a_shared_object_of_another_in_a_shared_folder_is_never_loaded(tmp_path:
     data = (folder / "bait.so").read_bytes()
     code = (
         "import hashlib, pathlib, pidemu\n"
-        "from pidemu.targets import native\n"
+        "from pidemu.backends import native\n"
         "real = native.load\n"
         f"data = pathlib.Path({str(folder / 'bait.so')!r}).read_bytes()\n"
         "def load(stem, suffix):\n"  # whoever puts the file there knows what it is to be called

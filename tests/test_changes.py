@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Controller, Settings
+from pidemu.controller.signals import Event
 from pidemu.errors import ScanError, SettingError
-from pidemu.signals import Event
 from tests.helpers import made_up_card, scans_of, settings_of
 from tests.histories import history
 

@@ -15,7 +15,7 @@ from simple_pid import PID
 
 import pidemu
 from pidemu.errors import EngineError, ScanError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.helpers import Floats, option_combinations, scans_of, settings_of
 
 DATA = Path(__file__).parent / "data"

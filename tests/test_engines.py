@@ -15,17 +15,17 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, Process
-from pidemu.cache import warn
+from pidemu.backends import numba
+from pidemu.backends.cache import warn
+from pidemu.backends.choice import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
+from pidemu.backends.python import starting
+from pidemu.backends.runner import Runner
 from pidemu.checks.runs import plausible
-from pidemu.engines import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
 from pidemu.errors import EngineError
-from pidemu.loop.hold import Plant
-from pidemu.loop.simulation import _scan_by_scan
-from pidemu.loop.trial import trial
-from pidemu.scan.program import Program, Structure
-from pidemu.targets import numba
-from pidemu.targets.python import starting
-from pidemu.targets.runner import Runner
+from pidemu.process.hold import Plant
+from pidemu.program.ir import Program, Structure
+from pidemu.simulation.simulate import _scan_by_scan
+from pidemu.simulation.trial import trial
 from tests.fleet.support import EVERY_ENGINE, alike
 
 PROCESS = Process.from_lags(1.1, [7, 2], delay=1.3)
@@ -96,7 +96,7 @@ def test_many_loops_are_run_by_numpy_or_numba_and_few_by_python(compiled: dict[s
 
 
 def test_without_numba_loops_are_run_by_numpy_or_python_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    monkeypatch.setattr("pidemu.backends.choice.has_numba", lambda: False)
     program = loop_program()
     assert for_record(program, 10**7) == Choice("python", "Numba is not installed")
     assert for_loops(program.structure, 10**5, 10**4) == Choice("numpy", "many loops, and Numba is not installed")
@@ -130,7 +130,7 @@ def test_a_name_that_is_no_engine_is_refused_with_those_that_are() -> None:
 
 
 def test_an_engine_whose_library_is_missing_is_refused_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    monkeypatch.setattr("pidemu.backends.choice.has_numba", lambda: False)
     with pytest.raises(EngineError, match=r"the engine 'numba' needs Numba, which is not installed; pip install 'pidemu\[fast\]'"):
         pidemu.Controller(alike(1)[0].settings, engine="numba")
     monkeypatch.setattr("shutil.which", lambda *_, **__: None)
@@ -248,7 +248,7 @@ def test_a_history_of_a_thousand_outputs_has_the_same_bits_in_every_engine(engin
 @pytest.fixture
 def failures(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFixture]:
     """What is said about engines that fail; what is broken here works again afterwards."""
-    monkeypatch.setattr("pidemu.engines._BROKEN", set())
+    monkeypatch.setattr("pidemu.backends.choice._BROKEN", set())
     warn.cache_clear()
     yield caplog
     warn.cache_clear()

@@ -13,7 +13,7 @@ import sympy as sp
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pidemu.exact_numbers import Exact, InexactError, as_typed, exact, sqrt
+from pidemu.law.exact import Exact, InexactError, as_typed, exact, sqrt
 
 FRACTIONS = st.fractions(min_value=-100, max_value=100, max_denominator=1000)
 ROOTS = st.sampled_from([2, 3, 5, 6, 10, 12, 18])

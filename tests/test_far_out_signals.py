@@ -12,9 +12,9 @@ import pytest
 import pidemu
 from pidemu import Controller
 from pidemu.card.load import Card
+from pidemu.controller.signals import Event
 from pidemu.errors import ScanError
-from pidemu.settings import Settings
-from pidemu.signals import Event
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.cli.helpers import said
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Controller
+from pidemu.controller.signals import Event
 from pidemu.errors import ScanError
-from pidemu.settings import Settings
-from pidemu.signals import Event
+from pidemu.settings.settings import Settings
 from tests.helpers import Floats, made_up_card, settings_of
 from tests.histories import history
 

@@ -15,12 +15,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.algorithm import Algorithm, Place
-from pidemu.card.base import GENERAL_RULES, Rule
+from pidemu.algorithm.model import Algorithm, Place
 from pidemu.card.load import Card
+from pidemu.card.model.base import GENERAL_RULES, Rule
 from pidemu.errors import ScanError
-from pidemu.law import Law
-from pidemu.settings import Settings
+from pidemu.law.law import Law
+from pidemu.settings.settings import Settings
 from tests.helpers import made_up_card, scans_of, settings_of
 
 Block = Any

@@ -11,8 +11,8 @@ import pytest
 
 import pidemu
 from pidemu.errors import PidemuError, ProcessError, ScanError, SettingError
+from pidemu.parsing import pair, step
 from pidemu.plausible import GAIN, INTERVAL, number, plain_number, plausible, shown
-from pidemu.words import pair, step
 
 HUGE = 10**5000
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.emulator import Controller
+from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError
-from pidemu.plots import check_picture, plot_comparison, plot_run
-from pidemu.record.files import Floats, Record
-from pidemu.record.playback import play
+from pidemu.records.files import Floats, Record
+from pidemu.records.playback import play
+from pidemu.report.plots import check_picture, plot_comparison, plot_run
 from tests.cli.helpers import Said, said
 
 ROOT = Path(__file__).parents[1]

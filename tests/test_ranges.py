@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from pidemu.errors import SettingError
-from pidemu.quantities import measure_of
-from pidemu.range_relation import RangeQuestion, Relation, relation
-from pidemu.ranges import RANGES, SignalRange, Which, read_range
+from pidemu.settings.quantities import measure_of
+from pidemu.settings.range_relation import RangeQuestion, Relation, relation
+from pidemu.settings.ranges import RANGES, SignalRange, Which, read_range
 
 OVEN = SignalRange(0.0, 400.0, "degC")
 

@@ -11,7 +11,7 @@ import sympy
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pidemu.series import Series, hold, one_minus_delay
+from pidemu.law.power_series import Series, hold, one_minus_delay
 
 TERMS = 8
 """From 1/s on to s^6."""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.card.load import Card
 from pidemu.errors import SettingError, UnitError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.helpers import made_up_card, option_combinations, settings_of
 
 DIALS: dict[str, dict[str, Any]] = {

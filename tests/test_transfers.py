@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Controller
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from tests.helpers import made_up_card, scans_of, settings_of
 from tests.histories import history
 

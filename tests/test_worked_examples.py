@@ -18,14 +18,14 @@ from click.testing import CliRunner
 from pydantic import Field, ValidationError, model_validator
 
 import pidemu
-from pidemu.card.base import Model, Number, Text
-from pidemu.card.faults import problems
-from pidemu.card.source import Document, parse, parse_file
+from pidemu.card.document import Document, parse, parse_file
+from pidemu.card.model.base import Model, Number, Text
+from pidemu.card.validation import problems
 from pidemu.cli import cli
 from pidemu.conversion.loopfile import read_loop
 from pidemu.errors import CardError, Problem
-from pidemu.record.files import read_record
-from pidemu.settings import Settings
+from pidemu.records.files import read_record
+from pidemu.settings.settings import Settings
 
 ROOT = Path(__file__).parents[1]
 WORKED = ROOT / "specs" / "worked-examples"

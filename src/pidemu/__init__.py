@@ -9,15 +9,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pidemu.ambiguity.readings import Reading, readings
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
-    from pidemu.comparison.compare import Comparison, compare
+    from pidemu.controller.controller import Controller
+    from pidemu.controller.signals import Event
+    from pidemu.conversion.ambiguity.readings import Reading, readings
     from pidemu.conversion.convert import convert
     from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.result import Conversion
     from pidemu.conversion.verify import Verification, verify
-    from pidemu.emulator import Controller
     from pidemu.errors import (
         ActionError,
         CardError,
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
     from pidemu.fleet.table import LoopTable, read_loops
-    from pidemu.law import Law
-    from pidemu.loop.process import Process
-    from pidemu.loop.simulation import Simulation, simulate
-    from pidemu.record.files import Record, read_record
-    from pidemu.settings import Settings
-    from pidemu.signals import Event
+    from pidemu.law.law import Law
+    from pidemu.process.process import Process
+    from pidemu.records.compare import Comparison, compare
+    from pidemu.records.files import Record, read_record
+    from pidemu.settings.settings import Settings
+    from pidemu.simulation.simulate import Simulation, simulate
 
 __version__ = "0.1.0"
 
@@ -52,17 +52,17 @@ _HOMES = {
     "cards": "card.library",
     "load_card": "card.library",
     "Card": "card.load",
-    "Comparison": "comparison.compare",
-    "compare": "comparison.compare",
+    "Comparison": "records.compare",
+    "compare": "records.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
     "Verification": "conversion.verify",
     "verify": "conversion.verify",
     "Answer": "conversion.questions",
     "Question": "conversion.questions",
-    "Reading": "ambiguity.readings",
-    "readings": "ambiguity.readings",
-    "Controller": "emulator",
+    "Reading": "conversion.ambiguity.readings",
+    "readings": "conversion.ambiguity.readings",
+    "Controller": "controller.controller",
     "ActionError": "errors",
     "CardError": "errors",
     "CertificateError": "errors",
@@ -76,7 +76,7 @@ _HOMES = {
     "ScanError": "errors",
     "SettingError": "errors",
     "UnitError": "errors",
-    "Event": "signals",
+    "Event": "controller.signals",
     "Explanation": "explanation.model",
     "explain": "explanation.explain",
     "Fleet": "fleet.fleet",
@@ -84,13 +84,13 @@ _HOMES = {
     "Loop": "fleet.loops",
     "LoopTable": "fleet.table",
     "read_loops": "fleet.table",
-    "Law": "law",
-    "Process": "loop.process",
-    "Record": "record.files",
-    "read_record": "record.files",
-    "Settings": "settings",
-    "Simulation": "loop.simulation",
-    "simulate": "loop.simulation",
+    "Law": "law.law",
+    "Process": "process.process",
+    "Record": "records.files",
+    "read_record": "records.files",
+    "Settings": "settings.settings",
+    "Simulation": "simulation.simulate",
+    "simulate": "simulation.simulate",
 }
 
 __all__ = [

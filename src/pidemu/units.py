@@ -394,7 +394,7 @@ def from_canonical(role: Role, value: float, unit: Unit, spans: Spans = FULL) ->
 
 
 def to_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> Any:
-    """Return the canonical value of a finite dial without rounding, for a fraction or a `pidemu.exact_numbers.Exact`."""
+    """Return the canonical value of a finite dial without rounding, for a fraction or a `pidemu.law.exact.Exact`."""
     check_unit(role, unit)
     return _inward(role, value, unit, spans)
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.ambiguity.readings import apart, command_line
 from pidemu.card.library import card_files
 from pidemu.cli.common import assignments
+from pidemu.conversion.ambiguity.readings import apart, command_line
 from pidemu.errors import CardNotFoundError, SettingError
-from pidemu.ranges import SignalRange
-from pidemu.settings import Settings
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings
 from tests.checks.bench import VALID
 
 W = np.geomspace(1e-4, 1e2, 60)

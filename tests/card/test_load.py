@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import pidemu
-from pidemu.card.base import Status
 from pidemu.card.library import card_files
 from pidemu.card.load import Card, leaves, load_file, overlay, variants
+from pidemu.card.model.base import Status
 from pidemu.errors import CardError, SettingError
 from tests.checks.bench import CHOICE, VALID, WINDUP, edited, loaded
 

@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.backends import c, python
+from pidemu.card.document import Path_
 from pidemu.card.library import card_files, load_card
 from pidemu.card.load import Card, load_file, variants
-from pidemu.card.source import Path_
 from pidemu.checks.runs import plausible
 from pidemu.errors import CardError, ConversionRefusedError, PidemuError
-from pidemu.targets import c, python
 from tests.card.mutations import ABSURD, changed, document, scalars, written_out, wrong_names
 from tests.cli.helpers import said
 

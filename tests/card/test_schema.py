@@ -11,9 +11,11 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.card import base, integral, models, stages, terms
+from pidemu.card.document import parse
 from pidemu.card.load import card_from
-from pidemu.card.source import parse
+from pidemu.card.model import around as stages
+from pidemu.card.model import base, integral, terms
+from pidemu.card.model import card_file as models
 from pidemu.errors import CardError
 from tools.regenerate import RENEW, card_reference, card_schema
 

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.canonical import default_scan
-from pidemu.card.at_limits import limit_rows
-from pidemu.card.behaviour import mode_rows, scan_rows
+from pidemu.algorithm.resolve import default_scan
+from pidemu.card.datasheet.at_limits import limit_rows
+from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
+from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.load import Card, Variant
 from pidemu.card.references import is_active
-from pidemu.card.text import equation_heading, equation_lines
 from pidemu.errors import UndefinedError
-from pidemu.settings import Settings, limits
+from pidemu.settings.settings import Settings, limits
 from pidemu.units import Dimension, parse_unit
 from tests.helpers import made_up_card, option_combinations
 

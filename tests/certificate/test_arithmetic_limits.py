@@ -12,8 +12,8 @@ import pidemu
 from pidemu.certificate.arithmetic import smallest_error
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
-from pidemu.certificate.sides import sides
-from pidemu.settings import Settings
+from pidemu.certificate.scaled_controller import sides
+from pidemu.settings.settings import Settings
 from tests.checks.bench import VALID, edited, written
 
 SMALLEST = "smallest error that integrates [% of PV span]"

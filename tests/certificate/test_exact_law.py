@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.certificate.exact_law import ExactLaw, difference, divide, exact_algorithm, exact_paths, polynomial_text, trimmed
-from pidemu.exact_numbers import Exact
-from pidemu.rational import multiply
-from pidemu.settings import Settings
+from pidemu.law.exact import Exact
+from pidemu.law.rational import multiply
+from pidemu.settings.settings import Settings
 from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import settings_of
 

@@ -20,7 +20,7 @@ from pidemu.certificate.linear import certify, differences, time_scale
 from pidemu.certificate.models import Kick, PathComparison
 from pidemu.cli import cli
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.checks.bench import edited
 from tests.conversion.support import Floats, continuous, difference, settings_that_act
 from tests.helpers import made_up_card

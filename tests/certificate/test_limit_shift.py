@@ -8,7 +8,7 @@ import pytest
 
 import pidemu
 from pidemu.certificate.limit_shift import choices_that_hold, limit_shift
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 
 def settings(card: str, **values: object) -> Settings:

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 import pidemu
-from pidemu.algorithm import Lag
+from pidemu.algorithm.model import Lag
 from pidemu.certificate.noise import noise_change, noise_gain, noise_gain_of
-from pidemu.law import Law
+from pidemu.law.law import Law
 
 
 def settings(name: str, **dials: Any) -> pidemu.Settings:

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.card.stages import STARTS
-from pidemu.certificate import windup
+from pidemu.card.model.around import STARTS
+from pidemu.certificate import limit_test as windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.recovery import Recoveries, Recovery
-from pidemu.certificate.sides import sides
+from pidemu.certificate.scaled_controller import sides
 from pidemu.certificate.trials import Bench, Plan
-from pidemu.record.sampling import limits_for
-from pidemu.record.standard import scale_of, standard_record
-from pidemu.settings import Settings
+from pidemu.records.sampling import limits_for
+from pidemu.records.standard import scale_of, standard_record
+from pidemu.settings.settings import Settings
 from tests.checks.bench import VALID, edited, written
 from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import Floats

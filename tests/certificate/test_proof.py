@@ -19,7 +19,7 @@ from pidemu.certificate.linear import certify
 from pidemu.certificate.models import EXACT
 from pidemu.certificate.proof import Proof, prove
 from pidemu.errors import ConversionRefusedError, SettingError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.conversion.exact_pairs import EXACT as EXACT_PAIRS
 from tests.conversion.exact_pairs import FEEDBACK, Pair
 from tests.conversion.support import needed, settings_that_act

@@ -9,8 +9,8 @@ import pidemu
 from pidemu.certificate.models import EXACT, ScanByScan
 from pidemu.certificate.scanwise import common_interval, emulated, record_for
 from pidemu.errors import ScanError
-from pidemu.record.standard import standard_record
-from pidemu.settings import Settings
+from pidemu.records.standard import standard_record
+from pidemu.settings.settings import Settings
 from tests.helpers import WIDE, Floats
 
 LINEAR = ["at rest", "setpoint steps", "PV ramps", "PV steps", "PV sine sweep", "PV noise"]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
-from pidemu.law import Law
-from pidemu.settings import Settings
+from pidemu.law.law import Law
+from pidemu.settings.settings import Settings
 from tests.conversion.support import Complex, Floats, continuous
 
 W = np.geomspace(1e-4, 1e2, 200)

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from pidemu.checks import equations, runs, stages, statements
+from pidemu.checks import equations, runs, statements
+from pidemu.checks import surroundings as stages
 from pidemu.errors import CardError, Problem
 from tests.checks.bench import (
     ALPHA,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pidemu.checks import stages
+from pidemu.checks import surroundings as stages
 from tests.checks.bench import (
     ALPHA,
     ALPHA_EVIDENCE,

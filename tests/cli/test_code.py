@@ -12,9 +12,9 @@ import pytest
 
 import pidemu
 from pidemu.card.library import card_files
+from tests.backends.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, told
-from tests.targets.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
 
 Scan = tuple[float, float, bool, float | None]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import pidemu
-from pidemu.record.standard import standard_record
+from pidemu.records.standard import standard_record
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import Said, said, strict_json, told
 

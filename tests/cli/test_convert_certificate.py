@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.loop.process import parse_process
+from pidemu.process.process import parse_process
 from tests.cli.helpers import Said, answer, said, strict_json, told
 
 PROVOX = ("convert", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav")

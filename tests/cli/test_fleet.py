@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.analysis.figures import loop_figures
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.result import FleetResult
-from pidemu.loop.figures import loop_figures
 from tests.cli.helpers import said, strict_json, told
 
 HEAD = "tag,card,settings,process,scan,time\n"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import ConversionRefusedError, ScanError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.conversion.support import needed, settings_that_act
 from tests.conversion.usual import CARDS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pidemu
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.conversion.support import HUNDRED
 
 

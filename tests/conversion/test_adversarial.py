@@ -11,7 +11,7 @@ import pytest
 
 import pidemu
 from pidemu.conversion.result import Conversion
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.conversion.settled import load, settled
 from tests.conversion.support import Complex, Floats, continuous, needed, outputs
 from tests.conversion.usual import CARDS

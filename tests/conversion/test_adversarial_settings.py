@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.action import switch_position
-from pidemu.card.base import Rule
+from pidemu.card.model.base import Rule
 from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
-from pidemu.settings import Settings, off_values
+from pidemu.settings.action import switch_position
+from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Role
 from tests.conversion.settled import load, settled
 from tests.conversion.support import Floats, difference, needed, random_signal

@@ -11,12 +11,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.card.base import Status
+from pidemu.card.model.base import Status
 from pidemu.certificate.linear import bands
 from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError, ScanError
-from pidemu.settings import Settings, limits
+from pidemu.settings.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, rules, settings_that_act
 from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import WIDE, Floats

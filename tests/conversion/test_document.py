@@ -15,7 +15,7 @@ import pytest
 
 import pidemu
 from pidemu.errors import ConversionRefusedError, QuestionError
-from pidemu.loop.process import Process
+from pidemu.process.process import Process
 from tests.cli.helpers import said, strict_json
 from tests.conversion.commands import CONVERSIONS, OTHERS
 from tools.regenerate import RENEW, conversion_schema

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.conversion.support import HUNDRED, Floats, outputs, settings_that_act
 

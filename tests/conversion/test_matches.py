@@ -15,9 +15,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import pidemu
-from pidemu.conversion.aim import MATCHES
+from pidemu.conversion.match_method import MATCHES
 from pidemu.errors import ConversionRefusedError, SettingError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from tests.conversion.support import Complex, Floats, continuous
 from tests.helpers import made_up_card
 

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.certificate.models import EXACT
 from pidemu.errors import ConversionRefusedError, PidemuError
-from pidemu.loop.process import parse_process
-from pidemu.settings import Settings, off_values
+from pidemu.process.process import parse_process
+from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Role
 from tests.conversion.policy import RANGES, convert, converted, drawn
 from tests.conversion.support import continuous, random_signal

@@ -11,10 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from pidemu.errors import PidemuError
-from pidemu.loop.process import parse_process
-from pidemu.settings import limits
+from pidemu.process.process import parse_process
+from pidemu.settings.settings import limits
 from pidemu.units import Role
 from tests.conversion.policy import RANGES, TWO_SCANS, convert, converted, drawn, numbers, stated
 from tests.helpers import made_up_card, option_combinations

@@ -16,9 +16,9 @@ import pidemu
 from pidemu.conversion.target import is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError, ScanError, SettingError
-from pidemu.loop.process import parse_process
-from pidemu.plain import json_safe
-from pidemu.settings import Settings
+from pidemu.formatting import json_safe
+from pidemu.process.process import parse_process
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.cli.helpers import said, strict_json
 from tests.conversion.policy import PAIRS, RANGES, convert, converted, drawn, held, numbers, stated

@@ -12,7 +12,7 @@ import pytest
 import pidemu
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
-from pidemu.settings import Settings, limits
+from pidemu.settings.settings import Settings, limits
 from pidemu.units import Role, from_canonical, parse_unit
 
 

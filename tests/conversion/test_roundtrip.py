@@ -13,7 +13,7 @@ import pidemu
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.conversion.support import needed, settings_that_act
 

@@ -11,8 +11,8 @@ import pytest
 import pidemu
 from pidemu.conversion.spans import range_questions, ranges_needed, signals_note
 from pidemu.matrix.typical import held_dials, typical_settings
-from pidemu.ranges import SignalRange
-from pidemu.settings import Settings
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings
 from tests.cli.helpers import strict_json, told
 from tests.helpers import made_up_card
 

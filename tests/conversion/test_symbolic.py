@@ -14,10 +14,10 @@ import sympy as sp
 from sympy.parsing.sympy_parser import convert_xor, implicit_multiplication, parse_expr, standard_transformations
 
 import pidemu
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Rule
+from pidemu.algorithm.model import Algorithm
 from pidemu.card.load import Card
-from pidemu.law import Law
+from pidemu.card.model.base import Rule
+from pidemu.law.law import Law
 from tests.helpers import made_up_card
 
 Expr = Any

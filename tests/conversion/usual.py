@@ -9,7 +9,7 @@ from pidemu.card.load import variants
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.errors import UndefinedError
-from pidemu.settings import Settings, limits
+from pidemu.settings.settings import Settings, limits
 from tests.conversion.support import HUNDRED, needed
 
 

@@ -10,13 +10,13 @@ import pytest
 
 import pidemu
 from pidemu import Controller, Settings
-from pidemu.canonical import default_scan
-from pidemu.card.base import Form
+from pidemu.algorithm.resolve import default_scan
 from pidemu.card.load import Card
+from pidemu.card.model.base import Form
 from pidemu.card.references import is_active
 from pidemu.cutover.plan import TransferPlan, transfer_plan
 from pidemu.errors import SettingError
-from pidemu.settings import limits
+from pidemu.settings.settings import limits
 from pidemu.units import Role, Spans, from_canonical, parse_unit
 from tests.helpers import option_combinations
 

@@ -7,8 +7,8 @@ import pytest
 import pidemu
 from pidemu.conversion.result import Conversion
 from pidemu.errors import ScanError, SettingError
-from pidemu.range_relation import in_target_units
-from pidemu.ranges import read_range
+from pidemu.settings.range_relation import in_target_units
+from pidemu.settings.ranges import read_range
 
 
 def converted(old: str | None, new: str | None) -> Conversion:

@@ -9,8 +9,8 @@ import advanced_pid
 import pytest
 
 import pidemu
-from pidemu.card.base import Status
 from pidemu.card.load import variants
+from pidemu.card.model.base import Status
 from pidemu.cutover.plan import TransferPlan, transfer_plan
 from tests.cutover.bench import OP, PIDS, PV, SP, E, numbers, plan_for
 from tests.helpers import made_up_card

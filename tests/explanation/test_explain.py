@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.canonical import default_scan
+from pidemu.algorithm.resolve import default_scan
 from pidemu.card.library import card_files
 from pidemu.errors import ScanError
 from pidemu.explanation.forms import Times
-from pidemu.law import Law
+from pidemu.law.law import Law
 from tests.cli.helpers import strict_json
 
 EXAMPLES = [(i, e.given) for i in card_files() for e in pidemu.load_card(i).data.examples]

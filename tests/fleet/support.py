@@ -12,12 +12,12 @@ import pytest
 
 import pidemu
 from pidemu import FleetResult, Loop, Process, Simulation
+from pidemu.backends import native
+from pidemu.backends.choice import ENGINES, Engine
 from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible
-from pidemu.engines import ENGINES, Engine
 from pidemu.errors import PidemuError
-from pidemu.loop.trial import trial
-from pidemu.targets import native
+from pidemu.simulation.trial import trial
 
 COMPILER: Final = pytest.mark.skipif(not native.available(), reason="no C compiler on this machine")
 EVERY_ENGINE: Final = [pytest.param(e, marks=COMPILER) if e == "c" else e for e in ENGINES]

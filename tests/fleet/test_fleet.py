@@ -20,15 +20,15 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
-from pidemu.cache import warn
-from pidemu.engines import Engine, block
+from pidemu.backends.cache import warn
+from pidemu.backends.choice import Engine, block
 from pidemu.fleet import blocks, local, prepare
 from pidemu.fleet.blocks import COLUMNS
 from pidemu.fleet.judgement import RAN
 from pidemu.fleet.loops import Plan
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import HEADER
-from pidemu.scan.program import Structure
+from pidemu.program.ir import Structure
 from tests.fleet.support import EVERY_ENGINE, alike, alone, check_figures, check_signals, few, mixed, same
 
 STEPS: dict[str, Any] = {"setpoint": (5.0, 6.0), "load": (31.0, -20.0), "time": 60.0}
@@ -294,7 +294,7 @@ def test_loops_of_a_block_that_fails_are_run_one_by_one_in_python_and_it_is_said
     engine: Engine | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     warn.cache_clear()
-    monkeypatch.setattr("pidemu.engines.has_numba", lambda: False)
+    monkeypatch.setattr("pidemu.backends.choice.has_numba", lambda: False)
     expected = Fleet(alike(40)).simulate(**STEPS, keep=True, engine="python")
     monkeypatch.setattr(local, "block", lambda structure, engine: (breaks, 8))
     result = Fleet(alike(40)).simulate(**STEPS, keep=True, engine=engine)

@@ -16,7 +16,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
-from pidemu.cache import warn
+from pidemu.backends.cache import warn
 from pidemu.fleet import finished, local
 from pidemu.fleet.finished import keys
 from pidemu.fleet.folder import INDEX

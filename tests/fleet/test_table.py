@@ -14,7 +14,7 @@ from pidemu.errors import CardNotFoundError, FleetError
 from pidemu.fleet import table
 from pidemu.fleet.result import HEADER
 from pidemu.fleet.table import LoopTable, read_loops
-from pidemu.ranges import SignalRange
+from pidemu.settings.ranges import SignalRange
 from tests.checks.bench import VALID, edited, written
 
 HEAD = "tag,card,settings,process,scan,action,limits,setpoint,load,time"

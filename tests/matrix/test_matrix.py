@@ -24,7 +24,7 @@ from pidemu.matrix.cell import Cell, Work
 from pidemu.matrix.matrix import COLUMNS, Matrix, counts, matrix
 from pidemu.matrix.pairs import computed
 from pidemu.matrix.typical import held_dials, typical_settings
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.checks.bench import VALID, edited, written
 from tests.cli.helpers import told

@@ -28,11 +28,11 @@ from pidemu.conversion.convert import convert
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.statement import condition_line, sections
 from pidemu.errors import PidemuError
-from pidemu.loop.process import Process, parse_process
-from pidemu.loop.text import written
+from pidemu.process.process import Process, parse_process
+from pidemu.process.text import written
 from pidemu.report.certificate import certificate_page, write_page
 from pidemu.report.curves import bode, closed_loops, responses
-from pidemu.unverified import facts, unverified_law, unverified_program
+from pidemu.settings.unverified import facts, unverified_law, unverified_program
 from tests.cli.helpers import said, strict_json, told
 from tests.conversion.support import continuous, outputs
 from tests.helpers import made_up_card

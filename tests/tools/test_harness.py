@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import pidemu.record.files
+import pidemu.records.files
 from tests.tools import planted
 from tools.fuzz.case import Case, Kind, Ticket, case_of
 from tools.fuzz.cli import command
@@ -121,11 +121,11 @@ def test_an_error_of_pidemu_is_an_answer(tmp_path: Path) -> None:
 
 
 def test_a_crash_in_pidemu_is_found_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pidemu.record.files._times", lambda _cells: 1 / 0)
+    monkeypatch.setattr("pidemu.records.files._times", lambda _cells: 1 / 0)
     found = outcome(RUN, tmp_path, "time,sp,pv\n0,1,2\n1,1,2\n")
     assert found is not None
     assert "ZeroDivisionError" == found.what
-    assert found.place.startswith("src/pidemu/record/files.py:")
+    assert found.place.startswith("src/pidemu/records/files.py:")
     assert "ZeroDivisionError" in found.trace
 
 
@@ -136,8 +136,8 @@ def test_a_lost_row_in_pidemu_is_found(tmp_path: Path, monkeypatch: pytest.Monke
         found = kept(path)
         return replace(found, sp=found.sp[1:], pv=found.pv[1:], rows=found.rows[1:])
 
-    kept = pidemu.record.files.read_record
-    monkeypatch.setattr("pidemu.record.files.read_record", forgetful)
+    kept = pidemu.records.files.read_record
+    monkeypatch.setattr("pidemu.records.files.read_record", forgetful)
     monkeypatch.setattr("pidemu.cli.run.read_record", forgetful)
     text = "sp,pv\n50,50\n60,50\n60,51\n"
     for direct in (True, False):

@@ -7,7 +7,7 @@ from random import Random
 
 from pidemu import load_card
 from pidemu.card.library import card_files
-from pidemu.plain import exactly
+from pidemu.formatting import exactly
 from tools.fuzz.vocabulary import misspelt, quantity, text
 
 _ASSIGNMENTS = ("GAIN", "K", "Ti", "TI", "Td", "RESET", "pv_range", "op_range", "=", "", "x=y")

@@ -11,10 +11,10 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pidemu.card.models import CardFile, Equation
+from pidemu.card.model.card_file import CardFile, Equation
 
-BEGIN: Final = "<!-- generated from src/pidemu/card/models.py: begin -->"
-END: Final = "<!-- generated from src/pidemu/card/models.py: end -->"
+BEGIN: Final = "<!-- generated from src/pidemu/card/model/card_file.py: begin -->"
+END: Final = "<!-- generated from src/pidemu/card/model/card_file.py: end -->"
 
 
 def reference() -> str:

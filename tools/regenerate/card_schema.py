@@ -6,7 +6,7 @@ import copy
 import json
 from typing import Any, Final
 
-from pidemu.card.models import CardFile, Equation
+from pidemu.card.model.card_file import CardFile, Equation
 
 _WHOLE: Final = ("Filter", "SignalFilter", "Windup")
 """Parts that a choice replaces as a whole, by the beginning of their names."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from pidemu.card.base import Evidence, Status
 from pidemu.card.library import cards, load_card
 from pidemu.card.load import EMULATION, Card, variants
+from pidemu.card.model.base import Evidence, Status
 
 _HOW: Final = {
     Status.MEASURED: "against the real implementation",

@@ -10,7 +10,7 @@ import pidemu
 from pidemu.card.load import Card
 from pidemu.certificate.linear import bands, deviation
 from pidemu.conversion.explain import explained as explained_choices
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 TABLE = re.compile(r"^<!-- recomputed: (\w+) -->\n((?:\|.*\n)+)", re.MULTILINE)
 

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import ValidationError
 
-from pidemu.card.base import Evidence, Status
-from pidemu.card.faults import problems
-from pidemu.card.models import CardFile, Equation, Setting
+from pidemu.card.document import Document, Path_, parse_file
+from pidemu.card.model.base import Evidence, Status
+from pidemu.card.model.card_file import CardFile, Equation, Setting
 from pidemu.card.references import named_settings
-from pidemu.card.source import Document, Path_, parse_file
+from pidemu.card.validation import problems
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import is_hidden
 
 if TYPE_CHECKING:
-    from pidemu.settings import Settings
+    from pidemu.settings.settings import Settings
 
 EMULATION = "emulation"
 """Evidence key for how the emulation was verified; it leads to no field."""
@@ -344,7 +344,7 @@ class Card:
         >>> s["RESET"].to("s/repeat")
         15.0
         """
-        from pidemu.reading import make_settings  # settings depend on cards, not cards on settings
+        from pidemu.settings.parse import make_settings  # settings depend on cards, not cards on settings
 
         return make_settings(self, {**(given or {}), **values})
 

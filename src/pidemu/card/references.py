@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from pidemu.card.base import Form
-from pidemu.card.models import Equation, Setting
+from pidemu.card.model.base import Form
+from pidemu.card.model.card_file import Equation, Setting
 
 BY_ROLE: Final = (
     "gain", "multiplier", "integral", "derivative", "bias", "process-gain", "process-time", "process-delay", "closed-loop-time",

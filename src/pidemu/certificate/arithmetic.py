@@ -9,15 +9,15 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.backends.python import compiled
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.sides import Side
+from pidemu.certificate.scaled_controller import Side
+from pidemu.controller.running import resting
 from pidemu.errors import PidemuError
-from pidemu.record.files import Record
-from pidemu.record.sampling import Scale
-from pidemu.record.standard import REST
-from pidemu.running import resting
-from pidemu.scan.build import build
-from pidemu.targets.python import compiled
+from pidemu.program.builder import build
+from pidemu.records.files import Record
+from pidemu.records.sampling import Scale
+from pidemu.records.standard import REST
 
 _KEPT: Final = ("I", "M", "Ir")
 """States that an integral is kept in: the sum; with whole numbers the output's sum and the remainder."""

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Final, Literal, cast
 
-from pidemu import law as laws
-from pidemu.algorithm import Algorithm, Lag
-from pidemu.canonical import Reader, algorithm_as_read, default_scan
-from pidemu.exact_numbers import Exact, as_typed, exact
-from pidemu.ranges import SignalRange
-from pidemu.rational import Rational, add, multiply
-from pidemu.settings import Settings
+from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.algorithm.resolve import Reader, algorithm_as_read, default_scan
+from pidemu.law import law as laws
+from pidemu.law.exact import Exact, as_typed, exact
+from pidemu.law.rational import Rational, add, multiply
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings
 from pidemu.units import Spans, parse_unit, to_canonical, to_canonical_exactly
 
 Polynomial = tuple[Exact, ...]

@@ -10,7 +10,7 @@ from pidemu.units import Role
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
-    from pidemu.settings import Value
+    from pidemu.settings.settings import Value
 
 BAND_COLUMNS: Final = ("path", "band", "rad/s", "deviation", "gain", "phase")
 """Headings of `band_rows`."""

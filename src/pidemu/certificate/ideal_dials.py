@@ -10,12 +10,12 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Form
 from pidemu.certificate.exact_law import ExactLaw, ExactReader, PathName, divide, exact_algorithm, exact_paths, exact_spans, trimmed
-from pidemu.exact_numbers import Exact, InexactError, exact, sqrt
-from pidemu.rational import multiply
-from pidemu.settings import Settings
+from pidemu.law.exact import Exact, InexactError, exact, sqrt
+from pidemu.law.rational import multiply
+from pidemu.settings.settings import Settings
 from pidemu.units import Role, from_canonical_exactly, parse_unit
 
 _ZERO: Final = Exact(0)

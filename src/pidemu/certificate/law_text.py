@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pidemu.algorithm import Algorithm, Lag
-from pidemu.card.base import Form
-from pidemu.card.models import Equation
+from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.card.model.base import Form
+from pidemu.card.model.card_file import Equation
 from pidemu.certificate.exact_law import ExactLaw, PathName, in_mode
-from pidemu.exact_numbers import Exact, exact
+from pidemu.law.exact import Exact, exact
 
 
 def law_text(equation: Equation, a: Algorithm, path: PathName, law: ExactLaw, factor: Exact) -> str:

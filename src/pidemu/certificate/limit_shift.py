@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 
 from pidemu.card.load import Card
-from pidemu.certificate.sides import Side, sides
-from pidemu.record.files import Record
-from pidemu.record.playback import Timing
-from pidemu.record.sampling import Scale, controller_for, limits_for
-from pidemu.record.standard import REST
-from pidemu.settings import Settings
+from pidemu.certificate.scaled_controller import Side, sides
+from pidemu.records.files import Record
+from pidemu.records.playback import Timing
+from pidemu.records.sampling import Scale, controller_for, limits_for
+from pidemu.records.standard import REST
+from pidemu.settings.settings import Settings
 
 _ERROR: Final = 40.0
 """The excursion of the measurement [% of span], less where the gain is above 2."""

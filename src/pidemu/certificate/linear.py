@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.certificate.models import Band, Certificate, Kick, PathComparison
-from pidemu.law import Law, PathName
-from pidemu.rational import Response
+from pidemu.law.law import Law, PathName
+from pidemu.law.rational import Response
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 Floats = npt.NDArray[np.float64]
 

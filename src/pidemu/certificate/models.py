@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pidemu.plain import json_safe
+from pidemu.formatting import json_safe
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof

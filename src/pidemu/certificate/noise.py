@@ -18,8 +18,8 @@ import numpy as np
 
 from pidemu.certificate.figures import number, unit_of
 from pidemu.errors import PidemuError
-from pidemu.law import Law
-from pidemu.settings import Settings, Value, limits
+from pidemu.law.law import Law
+from pidemu.settings.settings import Settings, Value, limits
 from pidemu.units import Role
 
 MORE: Final = 1.25

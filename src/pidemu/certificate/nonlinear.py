@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from pidemu.action import acting_alike
-from pidemu.card.stages import STARTS
+from pidemu.card.model.around import STARTS
 from pidemu.certificate.arithmetic import arithmetic_differences
+from pidemu.certificate.differences import error_differences, limit_differences, output_differences, setpoint_differences
+from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.sides import Side, sides
-from pidemu.certificate.stages import error_differences, limit_differences, output_differences, setpoint_differences
+from pidemu.certificate.scaled_controller import Side, sides
 from pidemu.certificate.trials import Bench, Plan, planned
-from pidemu.certificate.windup import output_number, unknown_windup, windup_differences
 from pidemu.errors import PidemuError
-from pidemu.range_relation import Relation, relation
-from pidemu.record.sampling import limits_for
-from pidemu.settings import Settings
+from pidemu.records.sampling import limits_for
+from pidemu.settings.action import acting_alike
+from pidemu.settings.range_relation import Relation, relation
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 _MANUAL: Final = {
@@ -53,7 +53,7 @@ def nonlinear_differences(
     scans : tuple of float
         Their scan intervals [s].
     time_and_size : tuple of float
-        Characteristic time [s] and size [%] of the standard record, as `pidemu.record.standard.scale_of` gives them for the source.
+        Characteristic time [s] and size [%] of the standard record, as `pidemu.records.standard.scale_of` gives them for the source.
         A time of more than 2,000 scans of the faster, or less than 20 of the slower controller gives way to that.
     limits : tuple of float, optional
         Output limits that both are set to [% of the output span]; by default the source card's.

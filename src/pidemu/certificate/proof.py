@@ -13,15 +13,15 @@ from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from typing import Any, Final, Literal
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from pidemu.certificate.exact_law import ExactLaw, PathName, difference, exact_algorithm, exact_paths
 from pidemu.certificate.ideal_dials import Dials
 from pidemu.certificate.law_text import law_text
 from pidemu.certificate.models import EXACT
 from pidemu.errors import PidemuError
-from pidemu.exact_numbers import Exact, as_typed
-from pidemu.plain import json_safe
-from pidemu.settings import Settings
+from pidemu.formatting import json_safe
+from pidemu.law.exact import Exact, as_typed
+from pidemu.settings.settings import Settings
 from pidemu.units import Dimension, parse_unit
 
 Mode = Literal["auto", "cascade", "both"]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pidemu.certificate.models import ScanCost, TooSlow
-from pidemu.law import Law
+from pidemu.law.law import Law
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 _BELOW = 0.5
 """Share of half the scan rate at which rules are compared where the crossover lies beyond it."""
@@ -44,7 +44,7 @@ def scan_cost(source: Law, target: Law, factor: float = 1.0, process: Process | 
     plain = Law(source.algorithm), Law(target.algorithm)
     at = usual_crossover(plain[0])
     if process is not None:
-        from pidemu.loop.figures import crossover
+        from pidemu.analysis.figures import crossover
 
         found = crossover(lambda w: factor * source.held(w), process, source.scan)
         at = at if found is None else found

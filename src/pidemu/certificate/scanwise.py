@@ -9,17 +9,17 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.action import acting_alike
-from pidemu.canonical import default_scan
+from pidemu.algorithm.resolve import default_scan
 from pidemu.certificate.linear import time_scale
 from pidemu.certificate.models import EXACT, ScanByScan
 from pidemu.errors import ScanError
-from pidemu.record.files import Record
-from pidemu.record.playback import Timing
-from pidemu.record.sampling import Scale, controller_for
-from pidemu.record.standard import REST, Segment, StandardRecord, scale_of, standard_record
-from pidemu.scan.build import Action
-from pidemu.settings import Settings
+from pidemu.program.builder import Action
+from pidemu.records.files import Record
+from pidemu.records.playback import Timing
+from pidemu.records.sampling import Scale, controller_for
+from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
+from pidemu.settings.action import acting_alike
+from pidemu.settings.settings import Settings
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pidemu.law import Law
+from pidemu.law.law import Law
 
 _SAME_ROOT: Final = 1e-7
 """Relative distance of two roots that cancel: they come out of polynomials of low degree, to about this."""

@@ -9,15 +9,15 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.certificate.scaled_controller import Side
 from pidemu.certificate.scanwise import WIDE
-from pidemu.certificate.sides import Side
-from pidemu.emulator import Controller
+from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.record.files import Floats, Record
-from pidemu.record.playback import Timing
-from pidemu.record.sampling import Scale, controller_for
-from pidemu.record.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
-from pidemu.scan.build import Action
+from pidemu.program.builder import Action
+from pidemu.records.files import Floats, Record
+from pidemu.records.playback import Timing
+from pidemu.records.sampling import Scale, controller_for
+from pidemu.records.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
 
 _MOST_SCANS: Final = 2000
 """The characteristic time is at most this many scans: it is a figure that is wanted, not a plot."""

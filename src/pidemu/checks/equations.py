@@ -1,6 +1,6 @@
 """Rules on the equation that each combination of options makes: one function each, which says in one sentence why.
 
-Here are those on dials and terms; `pidemu.checks.stages` has those on what stands around the terms.
+Here are those on dials and terms; `pidemu.checks.surroundings` has those on what stands around the terms.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from pidemu.card.base import Rule
+from pidemu.card.document import Path_
 from pidemu.card.load import Variant, dotted
-from pidemu.card.models import Equation
+from pidemu.card.model.base import Rule
+from pidemu.card.model.card_file import Equation
+from pidemu.card.model.terms import Derivative, Proportional
 from pidemu.card.references import references
-from pidemu.card.source import Path_
-from pidemu.card.terms import Derivative, Proportional
-from pidemu.checks import stages
+from pidemu.checks import surroundings as stages
 from pidemu.errors import PidemuError, Problem, UnitError
-from pidemu.settings import limits, off_values
+from pidemu.settings.settings import limits, off_values
 from pidemu.units import LEVELS, RATES, Dimension, Role, Unit, check_unit, parse_quantity, parse_unit
 
 _NEUTRAL: Final = {

@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form, Status
+from pidemu.algorithm.model import Algorithm
+from pidemu.backends.python import compiled
+from pidemu.card.document import Path_
 from pidemu.card.load import Card, Variant, variants
-from pidemu.card.models import Canonical
+from pidemu.card.model.base import Form, Status
+from pidemu.card.model.card_file import Canonical
 from pidemu.card.references import is_active
-from pidemu.card.source import Path_
-from pidemu.emulator import Controller
+from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
-from pidemu.scan.build import build
-from pidemu.settings import Settings, limits, off_values
-from pidemu.targets.python import compiled
+from pidemu.program.builder import build
+from pidemu.settings.settings import Settings, limits, off_values
 
 _EXAMPLE_TOLERANCE: Final = 5.1e-6
 """Examples are printed with six digits."""

@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from pidemu.card.base import Status
+from pidemu.card.document import Path_
 from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
-from pidemu.card.models import Equation
+from pidemu.card.model.base import Status
+from pidemu.card.model.card_file import Equation
 from pidemu.card.references import BY_ROLE, references
-from pidemu.card.source import Path_
 from pidemu.errors import Problem, suggest
-from pidemu.ranges import RANGES
+from pidemu.settings.ranges import RANGES
 
 
 def reject_wrong_folder(card: Card) -> Iterator[Problem]:

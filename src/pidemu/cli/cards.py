@@ -6,9 +6,9 @@ from collections import Counter
 
 import click
 
-from pidemu.card.base import Status
 from pidemu.card.library import card_files, unusable_files
 from pidemu.card.load import Card, load_file
+from pidemu.card.model.base import Status
 from pidemu.cli.common import echo, json_option, print_json, table, vendors_option
 from pidemu.errors import CardError
 

@@ -35,7 +35,7 @@ from pidemu.conversion.statement import (
     target_rows,
 )
 from pidemu.errors import ConversionRefusedError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
     from pidemu.cutover.plan import TransferPlan

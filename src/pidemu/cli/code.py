@@ -11,14 +11,14 @@ import click
 from pidemu.card.library import load_card
 from pidemu.cli.common import Output, action_option, assignments, echo, limits_option, vendors_option
 from pidemu.cli.outputs import inputs
-from pidemu.emulator import Controller
+from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
 from pidemu.files.reading import reason
 from pidemu.files.writing import beside
-from pidemu.scan.program import Program
-from pidemu.settings import Settings
-from pidemu.unverified import facts, unverified_program
+from pidemu.program.ir import Program
+from pidemu.settings.settings import Settings
+from pidemu.settings.unverified import facts, unverified_program
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
@@ -46,7 +46,7 @@ def command(
 
     Its head names what the program rests on and no source of the card states: rules, windup, transfer, limits.
     """
-    from pidemu.targets.c import check_name
+    from pidemu.backends.c import check_name
 
     if name is not None and lang == "python" and out is None:
         raise click.UsageError("--name names the file of a Python module; give --out as well")
@@ -80,17 +80,17 @@ def _name(card_id: str) -> str:
 
 def _printed(program: Program, lang: str, name: str, notes: Sequence[str]) -> str:
     if lang == "c":
-        from pidemu.targets.c import single
+        from pidemu.backends.c import single
 
         return single(program, name, notes)
-    from pidemu.targets.python import source
+    from pidemu.backends.python import source
 
     return source(program, notes)
 
 
 def _files(program: Program, lang: str, name: str, notes: Sequence[str]) -> dict[str, str]:
     if lang == "c":
-        from pidemu.targets.c import header, source
+        from pidemu.backends.c import header, source
 
         return {f"{name}.h": header(program, name, notes), f"{name}.c": source(program, name, notes)}
     return {f"{name}.py": _printed(program, lang, name, notes)}

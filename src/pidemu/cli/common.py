@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from pidemu.backends.choice import ENGINES, Engine
 from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
-from pidemu.engines import ENGINES, Engine
 from pidemu.errors import SettingError
 from pidemu.excerpt import printable, printable_json, shortened, visible
-from pidemu.plain import json_safe
-from pidemu.ranges import SignalRange, read_range
-from pidemu.words import assignments as assignments  # noqa: PLC0414
-from pidemu.words import pair, seconds, step
+from pidemu.formatting import json_safe
+from pidemu.parsing import assignments as assignments  # noqa: PLC0414
+from pidemu.parsing import pair, seconds, step
+from pidemu.settings.ranges import SignalRange, read_range
 
 if TYPE_CHECKING:
     _NameType = click.ParamType[str]

@@ -23,16 +23,16 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
-from pidemu.cli.happened import moved
+from pidemu.cli.events import moved
 from pidemu.cli.outputs import check_outputs, inputs
-from pidemu.comparison.compare import Comparison, compare
-from pidemu.comparison.side_by_side import dials
 from pidemu.errors import RecordError
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
-from pidemu.record.files import SIGNALS, Record, write_record
-from pidemu.record.playback import NO_BUMP
-from pidemu.record.standard import StandardRecord
+from pidemu.records.compare import Comparison, compare
+from pidemu.records.files import SIGNALS, Record, write_record
+from pidemu.records.playback import NO_BUMP
+from pidemu.records.side_by_side import dials
+from pidemu.records.standard import StandardRecord
 
 if TYPE_CHECKING:
     _ScansType = click.ParamType[tuple[float, ...]]
@@ -99,7 +99,7 @@ def command(
     length goes by the integral time of the first card, its size by the gain.
     """
     if picture is not None:
-        from pidemu.plots import check_picture
+        from pidemu.report.plots import check_picture
 
         check_picture(picture)
     named = _split(words)
@@ -126,7 +126,7 @@ def command(
     for note in (*skipped, *comparison.notes):
         echo(f"note: {note}", err=True)
     if picture is not None:
-        from pidemu.plots import plot_comparison
+        from pidemu.report.plots import plot_comparison
 
         plot_comparison(picture, comparison)
 

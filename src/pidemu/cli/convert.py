@@ -27,12 +27,12 @@ from pidemu.cli.common import (
 )
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.cli.questions import print_questions
-from pidemu.conversion.aim import read_aim
 from pidemu.conversion.convert import convert
+from pidemu.conversion.match_method import read_aim
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import ActionError, ConversionRefusedError, PidemuError, QuestionError, SettingError
-from pidemu.ranges import SignalRange
-from pidemu.settings import Settings
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -203,7 +203,7 @@ def command(
     if loop is not None:
         arguments |= {name: value for name, value in loop.others.items() if not _was_given(name)}
     if process is not None:
-        from pidemu.loop.process import parse_process
+        from pidemu.process.process import parse_process
 
         arguments["process"] = parse_process(process)
     if word is not None:
@@ -272,8 +272,8 @@ def _only_reading(
     as_json: bool,
 ) -> Settings:
     """Return the settings that can be meant; where there are several, print them all and exit."""
-    from pidemu.ambiguity.readings import readings
     from pidemu.cli.readings import refuse_to_choose
+    from pidemu.conversion.ambiguity.readings import readings
 
     found = readings(word, given, vendors=vendors)
     if len(found) > 1:

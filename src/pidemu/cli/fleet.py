@@ -37,7 +37,7 @@ from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.result import FleetResult
 from pidemu.fleet.table import LoopTable, read_loops
 from pidemu.fleet.writing import instead_of, refuse_overlap
-from pidemu.plain import json_safe
+from pidemu.formatting import json_safe
 
 _ROWS: Final = 20
 """Loops that are shown; a plant has thousands."""

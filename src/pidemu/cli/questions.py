@@ -8,7 +8,7 @@ from pidemu.conversion.questions import Question
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
 from pidemu.errors import QuestionError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 
 def print_questions(error: QuestionError, source: Settings | None, goal: str, as_json: bool) -> None:

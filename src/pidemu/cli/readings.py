@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
-from pidemu.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.card.load import Card
 from pidemu.cli.common import number
 from pidemu.cli.questions import print_questions
+from pidemu.conversion.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.conversion.convert import convert
 from pidemu.conversion.questions import Answer, Question
 from pidemu.conversion.request import read_request

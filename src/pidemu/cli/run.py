@@ -25,18 +25,18 @@ from pidemu.cli.common import (
     print_json,
     vendors_option,
 )
-from pidemu.cli.happened import tell
+from pidemu.cli.events import tell
 from pidemu.cli.outputs import check_outputs, inputs
-from pidemu.emulator import Controller
+from pidemu.controller.controller import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.excerpt import printable
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
-from pidemu.plain import json_safe
+from pidemu.formatting import json_safe
 from pidemu.plausible import plain_number
-from pidemu.record.files import Floats, Record, read_record, write_record
-from pidemu.record.playback import Playback, Timing, far_out, play, timing
-from pidemu.scan.build import Action
+from pidemu.program.builder import Action
+from pidemu.records.files import Floats, Record, read_record, write_record
+from pidemu.records.playback import Playback, Timing, far_out, play, timing
 
 
 @click.command("run", short_help="Run a card on recorded signals.")
@@ -103,7 +103,7 @@ def command(
     uneven one.
     """
     if picture is not None:
-        from pidemu.plots import check_picture
+        from pidemu.report.plots import check_picture
 
         check_picture(picture)
     settings = load_card(card, vendors).settings(assignments(values))
@@ -135,7 +135,7 @@ def command(
     if record.output is not None:
         echo(_difference(record, emulated), err=True)
     if picture is not None:
-        from pidemu.plots import plot_run
+        from pidemu.report.plots import plot_run
 
         plot_run(picture, settings, record, playback, bounds)
 

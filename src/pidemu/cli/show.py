@@ -10,14 +10,14 @@ from typing import Final
 
 import click
 
-from pidemu.card.at_limits import limit_rows
-from pidemu.card.base import Evidence
-from pidemu.card.behaviour import mode_rows, scan_rows
+from pidemu.card.datasheet.at_limits import limit_rows
+from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
+from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
-from pidemu.card.models import Example, Setting
+from pidemu.card.model.base import Evidence
+from pidemu.card.model.card_file import Example, Setting
 from pidemu.card.references import is_active
-from pidemu.card.text import equation_heading, equation_lines
 from pidemu.cli.common import (
     Range,
     Time,
@@ -37,9 +37,9 @@ from pidemu.excerpt import visible
 from pidemu.explanation.explain import explain
 from pidemu.explanation.model import Explanation
 from pidemu.explanation.text import sections, table_lines
-from pidemu.plain import json_safe
-from pidemu.ranges import RANGES, SignalRange
-from pidemu.settings import off_values
+from pidemu.formatting import json_safe
+from pidemu.settings.ranges import RANGES, SignalRange
+from pidemu.settings.settings import off_values
 
 _WIDTH: Final = 110
 _LEAST: Final = 36

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import click
 
+from pidemu.backends.choice import Choice, checked
 from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.certificate.models import LoopFigures
@@ -30,18 +31,17 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.outputs import check_outputs, inputs
-from pidemu.engines import Choice, checked
 from pidemu.errors import RecordError
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
-from pidemu.loop.outcome import has_settled, margins_of, stability_of
-from pidemu.loop.process import parse_process
-from pidemu.loop.simulation import run_trial
-from pidemu.loop.trial import Step, Trial, trial
-from pidemu.plain import json_safe
-from pidemu.record.files import Record, write_record
-from pidemu.scan.build import Action
+from pidemu.formatting import json_safe
+from pidemu.process.process import parse_process
+from pidemu.program.builder import Action
+from pidemu.records.files import Record, write_record
+from pidemu.simulation.outcome import has_settled, margins_of, stability_of
+from pidemu.simulation.simulate import run_trial
+from pidemu.simulation.trial import Step, Trial, trial
 
 _ACTIONS: Final[Mapping[str | None, Action | None]] = {None: None, "reverse": "reverse", "direct": "direct"}
 _NAMES: Final = {

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from pidemu.action import carried_action, check_action
-from pidemu.card.base import Form
 from pidemu.card.load import Card
+from pidemu.card.model.base import Form
 from pidemu.conversion.command import words_for
 from pidemu.conversion.modes import depends_on_mode
 from pidemu.conversion.options import Attempt
@@ -17,8 +16,9 @@ from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.spans import range_questions, rescaling
 from pidemu.conversion.unstated import Alternative, Open
 from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
-from pidemu.range_relation import RangeQuestion
-from pidemu.settings import Settings
+from pidemu.settings.action import carried_action, check_action
+from pidemu.settings.range_relation import RangeQuestion
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pidemu.certificate.figures import number, percent
 from pidemu.certificate.models import EXACT, LEAST_PHASE, RANK
-from pidemu.conversion.aim import Aim
 from pidemu.conversion.command import set_words
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match_method import Aim
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 if TYPE_CHECKING:

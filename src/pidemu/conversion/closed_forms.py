@@ -6,20 +6,20 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form, Status
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Form, Status
 from pidemu.certificate.linear import certify
 from pidemu.certificate.models import EXACT, RANK, Certificate
 from pidemu.conversion import match as closed
-from pidemu.conversion.aim import Match
 from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match_method import Match
 from pidemu.conversion.modes import Mode, in_mode, law_in
 from pidemu.conversion.moments import Problem, Way, meet, sizes
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import SettingError
-from pidemu.law import Law
-from pidemu.settings import Settings, limits
+from pidemu.law.law import Law
+from pidemu.settings.settings import Settings, limits
 from pidemu.units import Role
 
 _DEAR = 0.01

@@ -9,9 +9,9 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.conversion.request import Request
 from pidemu.errors import PidemuError
-from pidemu.plain import exactly
-from pidemu.ranges import RANGES, option_of
-from pidemu.settings import Settings
+from pidemu.formatting import exactly
+from pidemu.settings.ranges import RANGES, option_of
+from pidemu.settings.settings import Settings
 
 
 def set_words(options: Mapping[str, str]) -> str:

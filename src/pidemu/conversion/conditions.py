@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
-from pidemu.card.base import Form, Status
 from pidemu.card.load import Statement
-from pidemu.card.models import Equation
+from pidemu.card.model.base import Form, Status
+from pidemu.card.model.card_file import Equation
+from pidemu.card.model.terms import Filter
 from pidemu.card.references import is_active
-from pidemu.card.terms import Filter
 from pidemu.certificate.figures import number, percent
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 if TYPE_CHECKING:

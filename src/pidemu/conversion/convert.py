@@ -7,13 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pidemu.action import switch_position
-from pidemu.canonical import default_scan
+from pidemu.algorithm.resolve import default_scan
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
-from pidemu.conversion.aim import Aim, read_aim
 from pidemu.conversion.asking import (
     action_questions,
     ask,
@@ -23,9 +21,10 @@ from pidemu.conversion.asking import (
     scale_questions,
     taken_for_granted,
 )
+from pidemu.conversion.certify import full_certificate
 from pidemu.conversion.command import set_words
-from pidemu.conversion.issue import full_certificate
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match_method import Aim, read_aim
 from pidemu.conversion.modes import MODES, Mode
 from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
@@ -45,15 +44,16 @@ from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ConversionRefusedError, ScanError, SettingError
-from pidemu.exact_numbers import as_typed
-from pidemu.ranges import RangeGiven
-from pidemu.record.sampling import Scale
-from pidemu.scan.build import Action
-from pidemu.settings import Settings, Value, limits
+from pidemu.law.exact import as_typed
+from pidemu.program.builder import Action
+from pidemu.records.sampling import Scale
+from pidemu.settings.action import switch_position
+from pidemu.settings.ranges import RangeGiven
+from pidemu.settings.settings import Settings, Value, limits
 from pidemu.units import Role, from_canonical, parse_unit
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 _PAIRED = (None, "exact", "same-numbers")
 """Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
@@ -109,7 +109,7 @@ def convert(
     to_pv_range, to_op_range : tuple or str, optional
         Ranges of the target's measurement and output with their unit, ``(0, 1000, "degF")``; by default the source's. Another
         range of the same quantity rescales the gain for the same effect in its units; the same signal on another scale, such as
-        counts, does not (see `pidemu.range_relation.relation`).
+        counts, does not (see `pidemu.settings.range_relation.relation`).
     match : str, optional
         How to match: ``"exact"``, ``"same-numbers"`` (the source's own), ``"low-frequency"``, ``"textbook"``,
         ``"frequency:0.02rad/s"``, ``"frequency"`` (at the crossover with the process), ``"loop"`` (with a process: the load

@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import pidemu
-from pidemu.plain import json_safe
+from pidemu.formatting import json_safe
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
     from pidemu.errors import ConversionRefusedError, QuestionError
-    from pidemu.settings import Settings
+    from pidemu.settings.settings import Settings
 
 SCHEMA: Final = "pidemu-conversion-1"
 """Name and version of the form; a change that breaks a reader counts the version up."""

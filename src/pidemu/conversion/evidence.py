@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from pidemu.card.base import Status
-from pidemu.settings import Settings
+from pidemu.card.model.base import Status
+from pidemu.settings.settings import Settings
 
 _SURENESS: Final = (Status.ASSUMED, Status.INFERRED, Status.DOCUMENTED, Status.MEASURED)
 

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Form
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import UndefinedError
-from pidemu.law import Law
+from pidemu.law.law import Law
 from pidemu.units import Role
 
 

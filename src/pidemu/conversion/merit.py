@@ -6,9 +6,9 @@ import math
 from dataclasses import astuple, dataclass, fields
 from typing import Final
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Form, Status
-from pidemu.card.models import Equation
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Form, Status
+from pidemu.card.model.card_file import Equation
 from pidemu.card.references import is_active
 from pidemu.certificate.models import RANK, Certificate
 from pidemu.certificate.noise import noise_gain
@@ -16,7 +16,7 @@ from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.modes import in_mode, looked_at
 from pidemu.conversion.rounding import rounding_error
 from pidemu.conversion.solve import Solver
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 _NOISY: Final = 1.5

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final, Literal, get_args
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from pidemu.errors import SettingError, suggest
-from pidemu.law import Law
-from pidemu.settings import Settings
+from pidemu.law.law import Law
+from pidemu.settings.settings import Settings
 
 Mode = Literal["auto", "cascade"]
 Modes = Literal["auto", "cascade", "both"]

@@ -20,10 +20,10 @@ from pidemu.certificate.linear import bands
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import PidemuError
-from pidemu.law import Law
+from pidemu.law.law import Law
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 _ROUNDS = 60
 _CONVERGED = 1e-13

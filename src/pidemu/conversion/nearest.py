@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.card.base import Form
+from pidemu.card.model.base import Form
 from pidemu.certificate.linear import bands
 from pidemu.conversion.target import Numbers, Target
-from pidemu.law import Law, at_frequencies, paths
-from pidemu.settings import limits
+from pidemu.law.law import Law, at_frequencies, paths
+from pidemu.settings.settings import limits
 from pidemu.units import Role, parse_unit, to_canonical
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 _GRID: Final = 25
 _ROUNDS: Final = 16

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from pidemu.card.load import Card
-from pidemu.card.models import Equation
+from pidemu.card.model.card_file import Equation
 from pidemu.certificate.models import Certificate, Verdict
-from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match_method import Aim, Match
 from pidemu.conversion.merit import Merit, merit, unused
 from pidemu.conversion.solve import Solver
 from pidemu.conversion.target import is_computed
 from pidemu.errors import PidemuError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from pidemu.plain import json_safe
+from pidemu.formatting import json_safe
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion

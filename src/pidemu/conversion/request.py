@@ -9,20 +9,20 @@ from fractions import Fraction
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
-from pidemu.action import read_action
 from pidemu.card.load import Card
 from pidemu.conversion.modes import Modes, read_mode
 from pidemu.conversion.rounding import checked_digits
 from pidemu.errors import ScanError, SettingError
-from pidemu.loop.text import written
-from pidemu.plain import exactly
+from pidemu.formatting import exactly
 from pidemu.plausible import INTERVAL, LEVEL, number, plausible, shown
-from pidemu.ranges import RANGES, SignalRange, option_of, read_range
-from pidemu.reading import signal_range
-from pidemu.scan.build import Action
+from pidemu.process.text import written
+from pidemu.program.builder import Action
+from pidemu.settings.action import read_action
+from pidemu.settings.parse import signal_range
+from pidemu.settings.ranges import RANGES, SignalRange, option_of, read_range
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 
 @dataclass(frozen=True)

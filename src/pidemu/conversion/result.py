@@ -8,32 +8,32 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pidemu.action import ACTIONS, action_line, action_words, carried_action
 from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
-from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
 from pidemu.conversion.document import provenance
+from pidemu.conversion.match_method import Match
 from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
-from pidemu.plain import json_safe
-from pidemu.record.sampling import Scale
-from pidemu.scan.build import Action
-from pidemu.settings import Settings
-from pidemu.unverified import facts, unverified_law, unverified_program
+from pidemu.formatting import json_safe
+from pidemu.program.builder import Action
+from pidemu.records.sampling import Scale
+from pidemu.settings.action import ACTIONS, action_line, action_words, carried_action
+from pidemu.settings.settings import Settings
+from pidemu.settings.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof
     from pidemu.cutover.bench_check import BenchCheck
     from pidemu.cutover.plan import TransferPlan
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 
 @dataclass(frozen=True)

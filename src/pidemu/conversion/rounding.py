@@ -10,7 +10,7 @@ from typing import Final
 from pidemu.certificate.models import Rounded
 from pidemu.errors import SettingError
 from pidemu.plausible import shown
-from pidemu.settings import Settings, Value, limits, off_values
+from pidemu.settings.settings import Settings, Value, limits, off_values
 from pidemu.units import Role, is_reciprocal, parse_unit
 
 _NOTHING: Final = 1e-12

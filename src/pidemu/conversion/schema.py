@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from pidemu.certificate.models import Verdict
-from pidemu.conversion.aim import Match
 from pidemu.conversion.beside import Kind as BesideKind
+from pidemu.conversion.match_method import Match
 
 Number = float | Literal["inf", "-inf", "nan"]
 """JSON has no infinity: it is written as a word."""

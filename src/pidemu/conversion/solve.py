@@ -8,26 +8,26 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Rule, Status
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Rule, Status
 from pidemu.certificate.linear import bands, certify, compare_paths, deviation
 from pidemu.certificate.models import Certificate, Kick, ScanCost
 from pidemu.certificate.noise import MORE, noise_gain
 from pidemu.certificate.scan_cost import scan_cost
 from pidemu.conversion import match as closed
-from pidemu.conversion.aim import Aim, Match
 from pidemu.conversion.closed_forms import ClosedForms
 from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match_method import Aim, Match
 from pidemu.conversion.modes import Mode, Modes, law_in, looked_at
 from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
 from pidemu.conversion.nearest import USELESS, nearest
 from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import ScanError, SettingError
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
-    from pidemu.loop.process import Process
+    from pidemu.process.process import Process
 
 _FILTER_ROUNDS = 12
 _LEAST = {Rule.TRAPEZOIDAL: 0.5, Rule.FORWARD: 1.0, Rule.LAGGED_DIFFERENCE: 0.5}
@@ -194,7 +194,7 @@ class Solver:
         """Return by what settings are judged: the change of Ms with a process, else the deviation in the loop band."""
         if self.process is None:
             return self.continuous_deviation(settings)
-        from pidemu.loop.figures import loop_figures
+        from pidemu.analysis.figures import loop_figures
 
         old, new = (loop_figures(law, self.process, f).Ms for law, f in ((self.law, self.factor), (settings.law(), 1.0)))
         if not (math.isfinite(old) and math.isfinite(new)):
@@ -223,7 +223,7 @@ class Solver:
                 raise SettingError(f"{w:g} rad/s is beyond half the scan rate; match at a lower frequency")
             return w
         assert self.process is not None
-        from pidemu.loop.figures import crossover
+        from pidemu.analysis.figures import crossover
 
         wanted = self.at_source_scan or self.law
         found = crossover(lambda w: self.factor * wanted.held(w), self.process, None if self.scans is None else self.scans[0])

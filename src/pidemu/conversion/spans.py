@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
-from pidemu.card.base import Form
-from pidemu.range_relation import RangeQuestion, Relation, relation
-from pidemu.ranges import PERCENT, RANGES, SignalRange, Which, option_of
-from pidemu.settings import Settings, spans_of
+from pidemu.card.model.base import Form
+from pidemu.settings.range_relation import RangeQuestion, Relation, relation
+from pidemu.settings.ranges import PERCENT, RANGES, SignalRange, Which, option_of
+from pidemu.settings.settings import Settings, spans_of
 from pidemu.units import Role
 
 _EXAMPLES: Final[dict[Which, str]] = {"pv_range": "0,400 degC", "op_range": "0,100 %"}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 from pidemu.certificate.figures import emulation_line, kick_line, number, other_units, textbook_line, unit_of
 from pidemu.conversion.conditions import Condition
 from pidemu.conversion.target import is_computed
-from pidemu.settings import Settings, Value
-from pidemu.unverified import facts, unverified_law, unverified_program
+from pidemu.settings.settings import Settings, Value
+from pidemu.settings.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, Literal
 
-from pidemu.algorithm import Algorithm
-from pidemu.canonical import default_scan, gain_sign
-from pidemu.card.base import Form, Rule
+from pidemu.algorithm.model import Algorithm
+from pidemu.algorithm.resolve import default_scan, gain_sign
 from pidemu.card.load import Card, Variant
-from pidemu.card.models import Equation, Setting
+from pidemu.card.model.base import Form, Rule
+from pidemu.card.model.card_file import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
-from pidemu.ranges import SignalRange
-from pidemu.settings import Settings, limits, off_values, spans_of
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings, limits, off_values, spans_of
 from pidemu.units import Role, from_canonical, parse_unit, to_canonical
 
 FilterKind = Literal["none", "time", "ratio", "gain"]

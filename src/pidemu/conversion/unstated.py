@@ -10,8 +10,8 @@ from pidemu.certificate.linear import bands, deviation
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.questions import Answer, Kind, Question
 from pidemu.errors import PidemuError
-from pidemu.law import Law, PathName
-from pidemu.settings import Settings, off_values
+from pidemu.law.law import Law, PathName
+from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Dimension, Role, parse_quantity, parse_unit
 
 _ASKED: Final = 0.1

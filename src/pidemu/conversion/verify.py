@@ -214,7 +214,7 @@ def _arguments(asked: Asked) -> dict[str, Any]:
     """Return the arguments of `convert`."""
     found = {name: getattr(asked, name) for name in type(asked).model_fields if name not in ("source", "to")}
     if asked.process is not None:
-        from pidemu.loop.process import parse_process
+        from pidemu.process.process import parse_process
 
         found["process"] = parse_process(asked.process)
     return found

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import copysign, isfinite
 
-from pidemu.action import switch_position
-from pidemu.algorithm import Algorithm
-from pidemu.canonical import default_scan
-from pidemu.emulator import Controller
+from pidemu.algorithm.model import Algorithm
+from pidemu.algorithm.resolve import default_scan
+from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.ranges import SignalRange
-from pidemu.scan.build import Action
-from pidemu.settings import Settings, Value
+from pidemu.program.builder import Action
+from pidemu.settings.action import switch_position
+from pidemu.settings.ranges import SignalRange
+from pidemu.settings.settings import Settings, Value
 from pidemu.units import FULL, Role, from_canonical, parse_unit
 
 

@@ -13,16 +13,16 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.action import carried_action, switch_position
-from pidemu.canonical import default_scan
-from pidemu.card.base import Rule
+from pidemu.algorithm.resolve import default_scan
+from pidemu.card.model.base import Rule
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
-from pidemu.record.files import Floats
-from pidemu.record.playback import Timing
-from pidemu.record.sampling import Scale, controller_for
-from pidemu.scan.build import Action
-from pidemu.settings import Settings
+from pidemu.program.builder import Action
+from pidemu.records.files import Floats
+from pidemu.records.playback import Timing
+from pidemu.records.sampling import Scale, controller_for
+from pidemu.settings.action import carried_action, switch_position
+from pidemu.settings.settings import Settings
 
 STEPS: Final = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
 """Steps of the measurement [% of span], the usual one first; below 1 % only where gain or derivative is very large."""

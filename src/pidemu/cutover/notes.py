@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pidemu.card.base import Evidence, Status
-from pidemu.card.stages import STARTS
+from pidemu.card.model.around import STARTS
+from pidemu.card.model.base import Evidence, Status
 from pidemu.cutover.bench import Bench
 from pidemu.cutover.trials import LONGEST, Cut, Way, is_none, resolution
 from pidemu.units import Role

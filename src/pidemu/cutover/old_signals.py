@@ -7,9 +7,9 @@ from typing import Final
 
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
-from pidemu.range_relation import in_target_units
-from pidemu.ranges import PERCENT, SignalRange
-from pidemu.settings import Settings
+from pidemu.settings.range_relation import in_target_units
+from pidemu.settings.ranges import PERCENT, SignalRange
+from pidemu.settings.settings import Settings
 
 Signals = tuple[float, float, float]
 """Setpoint, measurement and output."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pidemu.action import ACTIONS, action_line, action_words, carried_action, check_action
 from pidemu.cutover.bench import Bench, bench_for
 from pidemu.cutover.notes import notes
 from pidemu.cutover.steps import Step, steps
 from pidemu.cutover.trials import NO_BUMP, cut_over, resolution
 from pidemu.cutover.ways import best_way, simple_way
 from pidemu.errors import ActionError, ScanError
-from pidemu.plain import json_safe
-from pidemu.scan.build import Action
-from pidemu.settings import Settings
+from pidemu.formatting import json_safe
+from pidemu.program.builder import Action
+from pidemu.settings.action import ACTIONS, action_line, action_words, carried_action, check_action
+from pidemu.settings.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import Rule
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import Rule
+from pidemu.controller.controller import Controller
+from pidemu.controller.running import Running
 from pidemu.cutover.bench import Bench
-from pidemu.emulator import Controller
-from pidemu.running import Running
 
 NO_BUMP: Final = 1e-9
 """Moves of the output below this [% of span] are rounding in float64."""

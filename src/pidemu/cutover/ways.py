@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from pidemu.controller.controller import Controller
 from pidemu.cutover.bench import Bench
 from pidemu.cutover.trials import Cut, Way, before, cut_over, factors, is_none, proportional, term
-from pidemu.emulator import Controller
 from pidemu.errors import SettingError
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from pidemu.card.base import Form
+from pidemu.card.model.base import Form
 from pidemu.certificate.figures import number
 from pidemu.explanation.model import Dial
-from pidemu.settings import Settings, Value
+from pidemu.settings.settings import Settings, Value
 from pidemu.units import Dimension, Role, parse_unit
 
 _PER_REPEAT: Final = ("s/repeat", "min/repeat", "repeat/min")

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from pidemu.algorithm import Algorithm
-from pidemu.canonical import default_scan
-from pidemu.card.base import LARGEST, SMALLEST, Form
+from pidemu.algorithm.model import Algorithm
+from pidemu.algorithm.resolve import default_scan
+from pidemu.analysis.open_loop import low_frequency_sign
+from pidemu.card.model.base import LARGEST, SMALLEST, Form
 from pidemu.errors import ScanError
 from pidemu.explanation.dials import dials_of, not_stated, ranges_missing
 from pidemu.explanation.forms import Forms, Times, forms_of
 from pidemu.explanation.model import Explanation, FilterFacts, Mode
 from pidemu.explanation.responses import ramp_of, responses_of
 from pidemu.explanation.words import action_sentence, summary_of
-from pidemu.loop.open_loop import low_frequency_sign
-from pidemu.settings import Settings
-from pidemu.unverified import facts, unverified_law
+from pidemu.settings.settings import Settings
+from pidemu.settings.unverified import facts, unverified_law
 
 
 def explain(settings: Settings, scan: float | None = None) -> Explanation:

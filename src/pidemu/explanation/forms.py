@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pidemu.algorithm import Algorithm
-from pidemu.card.base import LARGEST, SMALLEST
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import LARGEST, SMALLEST
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from typing import Any
 
 from pidemu.explanation.forms import Forms
 from pidemu.explanation.responses import Ramp, Responses
-from pidemu.plain import json_safe
-from pidemu.unverified import Fact
+from pidemu.formatting import json_safe
+from pidemu.settings.unverified import Fact
 
 
 @dataclass(frozen=True, slots=True)

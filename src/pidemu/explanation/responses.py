@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from pidemu.certificate.noise import noise_gain_of
-from pidemu.law import Law
+from pidemu.law.law import Law
 
 
 @dataclass(frozen=True, slots=True)

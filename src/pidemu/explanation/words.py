@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from pidemu.algorithm import Algorithm
+from pidemu.algorithm.model import Algorithm
 from pidemu.certificate.figures import number
 from pidemu.explanation.forms import Times
-from pidemu.settings import Settings
+from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
     from pidemu.explanation.model import Explanation, Mode

@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.engines import Choice
+from pidemu.backends.choice import Choice
+from pidemu.backends.runner import Block
 from pidemu.fleet.prepare import Prepared
-from pidemu.loop.experiment import FIGURES, integral_of_error
-from pidemu.loop.outcome import late_scan
-from pidemu.loop.simulation import run_trial
-from pidemu.loop.trial import Trial
-from pidemu.targets.runner import Block
+from pidemu.simulation.experiment import FIGURES, integral_of_error
+from pidemu.simulation.outcome import late_scan
+from pidemu.simulation.simulate import run_trial
+from pidemu.simulation.trial import Trial
 
 Floats = npt.NDArray[np.float64]
 Room = Callable[[tuple[int, int, int]], Floats]

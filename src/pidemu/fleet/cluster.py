@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pidemu.cache import warn
+from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.local import outcomes

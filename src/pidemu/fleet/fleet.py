@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
-from pidemu.engines import Engine, checked
+from pidemu.backends.choice import Engine, checked
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.finished import keys
@@ -18,7 +18,7 @@ from pidemu.fleet.prepare import Failed
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import FleetResult
 from pidemu.fleet.signals import SignalStore
-from pidemu.loop.trial import Step
+from pidemu.simulation.trial import Step
 
 
 class Fleet:

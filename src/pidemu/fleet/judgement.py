@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from pidemu.fleet.blocks import Outcome
-from pidemu.loop.outcome import has_settled, stability_of
+from pidemu.simulation.outcome import has_settled, stability_of
 
 Status = Literal["done", "unstable", "ran away", "failed", "not run"]
 RAN: Final[tuple[Status, ...]] = ("done", "unstable", "ran away")
@@ -25,7 +25,7 @@ class Judgement:
     status : {"done", "unstable", "ran away"}
         ``"unstable"``: the sampled loop is, within its limits; ``"ran away"``: the measurement outgrew all numbers.
     settled : bool
-        Whether the measurement had settled at the end of the run (`pidemu.loop.outcome.has_settled`).
+        Whether the measurement had settled at the end of the run (`pidemu.simulation.outcome.has_settled`).
     stable : bool or None
         Whether the loop is stable; ``None`` where that was not computed.
     margins : mapping of str to float

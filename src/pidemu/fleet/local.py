@@ -10,13 +10,13 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.engines import Choice, block, for_loops, instead, one_by_one
+from pidemu.backends.choice import Choice, block, for_loops, instead, one_by_one
+from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome, Room, Stopped, run_block
 from pidemu.fleet.loops import Loop, Plan
 from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared, reason_of
-from pidemu.scan.program import Structure
-from pidemu.targets.runner import Block
+from pidemu.program.ir import Structure
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
 """Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""

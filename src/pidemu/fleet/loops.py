@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pidemu.engines import Engine
+from pidemu.backends.choice import Engine
 from pidemu.errors import FleetError
-from pidemu.loop.process import Process
-from pidemu.loop.trial import Step, Trial, trial
-from pidemu.scan.build import Action
-from pidemu.settings import Settings
+from pidemu.process.process import Process
+from pidemu.program.builder import Action
+from pidemu.settings.settings import Settings
+from pidemu.simulation.trial import Step, Trial, trial
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pidemu.certificate.models import LoopFigures
 from pidemu.errors import PidemuError
 from pidemu.fleet.loops import Loop, Plan
-from pidemu.loop.experiment import Measuring, Steps, experiment
-from pidemu.loop.outcome import late_scan, margins_if_any
-from pidemu.loop.trial import Trial
-from pidemu.scan.program import Program, Structure
+from pidemu.program.ir import Program, Structure
+from pidemu.simulation.experiment import Measuring, Steps, experiment
+from pidemu.simulation.outcome import late_scan, margins_if_any
+from pidemu.simulation.trial import Trial
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from pidemu.fleet.folder import Place
 from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
-from pidemu.loop.trial import Trial
+from pidemu.simulation.trial import Trial
 
 Floats = npt.NDArray[np.float64]
 HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "settled", "stable", *MARGINS, "engine", "reason")

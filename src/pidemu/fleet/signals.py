@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.cache import warn
+from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
 from pidemu.fleet.finished import Finished, finished

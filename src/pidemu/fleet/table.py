@@ -15,9 +15,9 @@ from pidemu.files.tables import Lines, counted, split_lines, split_row, write_ta
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import reason_of
 from pidemu.fleet.result import HEADER, FleetResult
-from pidemu.loop.process import parse_process
-from pidemu.scan.build import Action
-from pidemu.words import assignments, pair, seconds, step
+from pidemu.parsing import assignments, pair, seconds, step
+from pidemu.process.process import parse_process
+from pidemu.program.builder import Action
 
 COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
 """Columns of a file of loops."""
@@ -116,7 +116,7 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
 
     The cells are separated by commas, or by semicolons or tabs where the header line has these. Columns, in any order: ``tag``,
     ``card``, ``settings`` (``GAIN=2; RESET=4; RATE=6 s``: dials in the card's units or with one, and options, by the card's names),
-    ``process`` (``gain=1, lag=20, delay=3``, see `pidemu.loop.process.parse_process`), and, where they are there, ``scan`` [s],
+    ``process`` (``gain=1, lag=20, delay=3``, see `pidemu.process.process.parse_process`), and, where they are there, ``scan`` [s],
     ``action`` (reverse, direct), ``limits`` of the output [%] (``0,100``), ``setpoint`` and ``load`` (size of a step [%], or when
     [s] and size: ``60,5``) and ``time`` [s]. What an empty cell does not say, the fleet decides.
 

@@ -17,10 +17,10 @@ from pidemu.conversion.result import Conversion
 from pidemu.conversion.spans import ranges_needed
 from pidemu.conversion.target import is_computed
 from pidemu.errors import ConversionRefusedError, QuestionError
+from pidemu.formatting import json_safe
 from pidemu.matrix.typical import held_dials, typical_settings
-from pidemu.plain import json_safe
-from pidemu.ranges import RANGES, SignalRange
-from pidemu.settings import Settings
+from pidemu.settings.ranges import RANGES, SignalRange
+from pidemu.settings.settings import Settings
 
 Outcome = Literal["exact", "exact-feedback", "approximate", "question", "refused", "failed"]
 

@@ -8,15 +8,15 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
-from pidemu.canonical import default_scan, gain_sign
-from pidemu.card.base import Form
+from pidemu.algorithm.resolve import default_scan, gain_sign
 from pidemu.card.load import Card, Variant, variants
-from pidemu.card.models import Equation, Setting
+from pidemu.card.model.base import Form
+from pidemu.card.model.card_file import Equation, Setting
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.conversion.target import is_computed
 from pidemu.errors import UndefinedError
-from pidemu.settings import Settings, limits, off_values
+from pidemu.settings.settings import Settings, limits, off_values
 from pidemu.units import Dimension, Role, Spans, from_canonical, parse_unit
 
 GAIN: Final = 2.0

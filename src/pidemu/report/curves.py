@@ -9,16 +9,16 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.action import acting_alike
 from pidemu.certificate.scanwise import WIDE
-from pidemu.comparison.side_by_side import run_on
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
-from pidemu.law import Law
-from pidemu.rational import Response
-from pidemu.record.files import Record
-from pidemu.record.standard import REST, scale_of
-from pidemu.settings import Settings
+from pidemu.law.law import Law
+from pidemu.law.rational import Response
+from pidemu.records.files import Record
+from pidemu.records.side_by_side import run_on
+from pidemu.records.standard import REST, scale_of
+from pidemu.settings.action import acting_alike
+from pidemu.settings.settings import Settings
 
 Floats = npt.NDArray[np.float64]
 Who = Literal["source", "target", "textbook"]
@@ -159,7 +159,7 @@ def responses(c: Conversion) -> Responses | None:
     """Return the outputs of both emulated controllers, and of the textbook settings where they are others.
 
     They run at the scan intervals of the certificate's emulation, from rest at 50 %, without output limits; the steps move the
-    source's output by about 8 % (`pidemu.record.standard.scale_of`).
+    source's output by about 8 % (`pidemu.records.standard.scale_of`).
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
     """Return what both controllers do in a closed loop with the process, after a setpoint step and then a load step.
 
     They run at the scan intervals of the conversion; where none were given both at the shorter of those that
-    `pidemu.loop.simulation.scan_for` finds. In both loops the process is as the target sees it.
+    `pidemu.simulation.simulate.scan_for` finds. In both loops the process is as the target sees it.
 
     Parameters
     ----------
@@ -238,8 +238,8 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
     process = c.process
     if process is None:
         return None
-    from pidemu.loop.figures import scan_for, settling_time
-    from pidemu.loop.simulation import simulate
+    from pidemu.analysis.figures import scan_for, settling_time
+    from pidemu.simulation.simulate import simulate
 
     scale = abs(c.factor)
     seen = replace(process, gain=process.gain * scale)  # by the source: its output counts in other percent

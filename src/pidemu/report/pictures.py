@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.certificate.figures import number
-from pidemu.rational import Response
+from pidemu.law.rational import Response
 from pidemu.report.curves import Bode, ClosedLoops, Responses, Trace, Who
 
 if TYPE_CHECKING:

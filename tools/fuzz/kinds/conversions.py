@@ -99,7 +99,7 @@ def _python(word: str) -> Any:
 
 def _argument(name: str, value: Any) -> Any:
     if name == "process":
-        from pidemu.loop.process import parse_process
+        from pidemu.process.process import parse_process
 
         return parse_process(value)
     if name in ("scan", "runs_every", "limits"):

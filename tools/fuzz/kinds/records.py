@@ -66,7 +66,7 @@ def run(case: Case) -> int:
     """Read the record and write it again, or run the whole command."""
     if not case.direct:
         return command(case)
-    from pidemu.record.files import read_record, write_record
+    from pidemu.records.files import read_record, write_record
 
     found = read_record("record.csv")
     stream = io.StringIO()

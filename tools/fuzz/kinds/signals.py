@@ -84,7 +84,7 @@ def run(case: Case) -> int:
     """Run the record in plain Python scan by scan, at once, and in another engine; compare every bit."""
     import pidemu
     from pidemu.errors import PidemuError
-    from pidemu.words import assignments
+    from pidemu.parsing import assignments
 
     words = case.words
     options = {words[i]: words[i + 1] for i in range(len(words) - 1) if words[i].startswith("--")}
@@ -103,7 +103,7 @@ def run(case: Case) -> int:
 
 
 def _signals() -> dict[str, Floats]:
-    from pidemu.record.files import SIGNALS, read_record
+    from pidemu.records.files import SIGNALS, read_record
 
     record = read_record("record.csv")
     names = ("sp", "pv", "auto", "manual", *SIGNALS)
@@ -113,7 +113,7 @@ def _signals() -> dict[str, Floats]:
 def _played(settings: Any, signals: dict[str, Floats], changes: list[list[str]], options: dict[str, str], engine: Any) -> Any:
     """Return outputs, states and events of a controller that had the signals and changes of settings."""
     import pidemu
-    from pidemu.words import assignments, pair
+    from pidemu.parsing import assignments, pair
 
     controller = pidemu.Controller(
         settings, float(options["--scan"]), "direct" if options["--action"] == "direct" else "reverse",

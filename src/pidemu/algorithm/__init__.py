@@ -1,0 +1,1 @@
+"""One algorithm with numbers for names, and how a card with settings becomes one."""

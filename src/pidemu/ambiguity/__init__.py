@@ -1,1 +1,0 @@
-"""Settings whose meaning is uncertain."""

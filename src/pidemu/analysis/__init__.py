@@ -1,0 +1,1 @@
+"""The loop in frequency and in stability: margins, sensitivity, the exact response to a load."""

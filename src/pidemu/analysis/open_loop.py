@@ -1,0 +1,191 @@
+"""The open loop of a controller and a process, and the frequencies at which it is looked at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.algorithm.model import Algorithm
+from pidemu.analysis.stability import unstable_continuous, unstable_sampled
+from pidemu.law.law import Law
+from pidemu.law.rational import Response
+from pidemu.process.process import Process
+
+Floats = npt.NDArray[np.float64]
+
+PER_DECADE: Final = 60
+_TURN: Final = 0.2
+"""Largest turn of the open loop between two neighbouring frequencies [rad]."""
+_QUIET: Final = 1e-3
+"""A loop gain below this counts only until the phase has come round."""
+_DELAY_ENDS: Final = (20.0, 4000.0)
+"""At least and at most this much phase of the dead time is looked at [rad]."""
+_DAMPING: Final = 1e-6
+"""Least damping of a process pole in frequency responses: at an undamped one, these would be infinite."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The open loop at frequencies between which nothing happens unseen.
+
+    Attributes
+    ----------
+    w, values : ndarray, shape (n,)
+        Frequencies [rad/s], and the open loop there.
+    w_beyond, beyond : ndarray, shape (m,)
+        The same on to high frequencies, where the dead time turns it more often than is looked at: only the size counts.
+    """
+
+    w: Floats
+    values: Response
+    w_beyond: Floats
+    beyond: Response
+
+    @property
+    def all_sizes(self) -> tuple[Floats, Floats]:
+        """All frequencies and the size of the open loop there."""
+        return np.concatenate([self.w, self.w_beyond]), np.abs(np.concatenate([self.values, self.beyond]))
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """A controller and a process in a row, with negative feedback.
+
+    The control action is taken to be the one with which the feedback is negative, whatever the sign of the controller's gain.
+
+    Attributes
+    ----------
+    law : Law
+        The controller, continuous or at a scan interval.
+    process : Process
+        The process.
+    factor : float
+        What the controller's gain is multiplied by for new signal ranges; its sign does not count.
+    """
+
+    law: Law
+    process: Process
+    factor: float = 1.0
+
+    @cached_property
+    def gain(self) -> float:
+        """The factor, with the sign that makes the feedback negative; 0 for a controller that does nothing."""
+        return abs(self.factor) * low_frequency_sign(self.law.algorithm) * self.process.feedback_sign
+
+    @cached_property
+    def _damped(self) -> Process:
+        """The process with poles a hair inside the stable region where they are on its edge, off the origin."""
+        poles = [
+            complex(-_DAMPING * abs(p), p.imag) if p.imag and abs(p.real) < _DAMPING * abs(p) else p for p in self.process.poles
+        ]
+        return Process(self.process.gain, poles, self.process.zeros, self.process.delay)
+
+    @cached_property
+    def _process_response(self) -> Callable[[npt.ArrayLike], Response]:
+        return self._damped.response if self.law.scan is None else self._damped.sampled(self.law.scan).response
+
+    def __call__(self, w: npt.ArrayLike) -> Response:
+        """Return the response of the open loop at frequencies [rad/s]."""
+        found: Response = self.gain * self.law.response(w) * self._process_response(w)
+        return found
+
+    @property
+    def integrates(self) -> int:
+        """How many integrators the controller and the process have together."""
+        a = self.law.algorithm
+        return self.process.integrators + int(bool(a.ki) or a.dahlin is not None)
+
+    def unstable(self, picture: Picture, crossovers: Floats) -> bool:
+        """Tell whether the closed loop is unstable, or on the edge of it.
+
+        Parameters
+        ----------
+        picture : Picture
+            The open loop.
+        crossovers : ndarray, shape (m,)
+            Where its gain is 1 [rad/s].
+        """
+        if self.law.scan is not None:
+            if np.any(np.abs(picture.beyond) >= 1):
+                return True  # a loop gain above 1 that the dead time has turned round many times
+            poles = sum(p.real > 0 for p in self.process.poles)
+            return unstable_sampled(picture.values, poles, self.integrates)
+        num, den = self.law.feedback.num, self.law.feedback.den
+        if num[0] == den[0] == 0:  # a common factor s of a controller without integral action
+            num, den = num[1:], den[1:]
+        P = self.process.rational
+        top, bottom = np.convolve(num, P.num) * self.gain, np.convolve(den, P.den)
+        return unstable_continuous(top, bottom, self.process.delay, crossovers)
+
+
+def low_frequency_sign(a: Algorithm) -> float:
+    """Return the sign of a controller's action at low frequencies: of its integral, else proportional, else derivative gain."""
+    if a.dahlin is not None:
+        return math.copysign(1.0, a.dahlin.gain)
+    return next((math.copysign(1.0, gain) for gain in (a.ki, a.kp, a.kd) if gain), 0.0)
+
+
+def _corners(loop: OpenLoop) -> list[float]:
+    """Return the frequencies at which controller and process change [rad/s]."""
+    a, P = loop.law.algorithm, loop.process
+    kp, ki, kd = abs(a.kp), abs(a.ki), abs(a.kd)
+    found = [abs(r) for r in (*P.poles, *P.zeros)]
+    found += [x / y for x, y in ((ki, kp), (kp, kd)) if y] + ([math.sqrt(ki / kd)] if kd else [])
+    times = [P.delay, a.Tf, *(lag.time for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None)]
+    if a.dahlin is not None:
+        times += [a.dahlin.time, a.dahlin.delay, a.dahlin.wanted]
+    found += [1 / t for t in times if t]
+    return [x for x in found if x] or [ki or 1.0]
+
+
+def _ends(loop: OpenLoop) -> tuple[float, float]:
+    """Return the frequencies between which the loop gain comes down from large to small values [rad/s]."""
+
+    def size(w: float) -> float:
+        return float(abs(loop(w)))
+
+    corners, h = _corners(loop), loop.law.scan
+    low, high = min(corners) / 100, max(corners) * 100
+    if h is not None:
+        high = math.pi / h
+        low = min(low, high / 1000)
+    for _ in range(30):
+        if not loop.integrates or size(low) > 100:
+            break
+        low /= 10
+    for _ in range(30):
+        if h is not None or size(high) < _QUIET or size(10 * high) > 0.5 * size(high):
+            break
+        high *= 10
+    return low, high
+
+
+def picture_of(loop: OpenLoop) -> Picture:
+    """Return the open loop at enough frequencies."""
+    low, high = _ends(loop)
+    w = np.geomspace(low, high, math.ceil(PER_DECADE * math.log10(high / low)))
+    turn = loop.process.delay + 1.5 * (loop.law.scan or 0.0)
+    beyond = w[:0]
+    if turn:
+        loud = w[np.abs(loop(w)) >= _QUIET]
+        least, most = (end / turn for end in _DELAY_ENDS)
+        stop = min(high, most, max(loud[-1] if loud.size else 0.0, least))
+        even = np.linspace(low, stop, math.ceil((stop - low) * turn / _TURN) + 2)
+        w, beyond = np.unique(np.concatenate([w[w < stop], even])), w[w > stop]
+    w = np.insert(w, 0, low * np.array([1e-4, 1e-2]))  # as good as zero frequency
+    values = loop(w)
+    for _ in range(24):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a process that lets nothing through has no phase
+            ratios = [x[1:] / x[:-1] for x in (values, 1 + values)]
+        rough = np.flatnonzero((np.abs(np.angle(ratios)) > 2 * _TURN).any(axis=0))
+        if not rough.size or w.size > 200_000:
+            break
+        between = np.sqrt(w[rough] * w[rough + 1])
+        w, values = np.insert(w, rough + 1, between), np.insert(values, rough + 1, loop(between))
+    return Picture(w, values, beyond, loop(beyond))

@@ -1,0 +1,1 @@
+"""A card in words, as its data sheet."""

@@ -1,0 +1,198 @@
+"""Limits, bands and rates of two controllers in numbers: what their cards do to error, setpoint and output (section 8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+from pidemu.algorithm.model import Shape
+from pidemu.certificate.models import NonlinearDifference
+from pidemu.certificate.scaled_controller import Side, alike, unlimited
+
+Figures = dict[str, tuple[float, float]]
+Pair = tuple[float, float]
+
+
+def limit_differences(source: Side, target: Side, *, stated: bool = False) -> Iterator[NonlinearDifference]:
+    """Yield how output limits as delivered, unless others are `stated`, and limits of the integral itself differ (section 5)."""
+    both = (source, target)
+    figures: Figures = {}
+    parts = []
+    unknown = any(side.engineering and side.settings.op_range is None for side in both)
+    low, high = zip(*(side.limits if unknown else side.limits_percent for side in both), strict=True)
+    units = [side.unit if unknown else "%" for side in both]
+    if not (stated or (alike(*low) and alike(*high))):
+        unit = units[0] if units[0] == units[1] else "% or engineering units"
+        figures |= {f"low output limit [{unit}]": _pair(low), f"high output limit [{unit}]": _pair(high)}
+        words = ", ".join(f"{_span((low[i], high[i]), units[i])} on {both[i].name}" for i in (0, 1))
+        parts.append(f"Output limits as delivered: {words}. Set those of the old controller on the new one{_in_own_units(target)}.")
+    if all(side.integrates for side in both):
+        mine, other = (_integral_limits(side) for side in both)
+        if not (alike(mine[0], other[0]) and alike(mine[1], other[1])):
+            figures |= {"low limit of the integral term [% of output span]": (mine[0], other[0])}
+            figures |= {"high limit of the integral term [% of output span]": (mine[1], other[1])}
+            words = ", ".join(f"{_span(found, '%')} on {side.name}" for found, side in zip((mine, other), both, strict=True))
+            parts.append(f"Limits of the integral term itself: {words}.")
+    if parts:
+        yield NonlinearDifference("limits", " ".join(parts), figures)
+
+
+def _in_own_units(target: Side) -> str:
+    """Return what 0 to 100 % is on a target that computes in engineering units."""
+    if not target.engineering:
+        return ""
+    if target.settings.op_range is None:
+        return f"; {target.name} has them in engineering units: give the range of the output to see them in %"
+    return f"; 0 to 100 % is {target.settings.op_range} there"
+
+
+def _span(limits: Pair, unit: str) -> str:
+    low, high = limits
+    if math.isinf(low) and math.isinf(high):
+        return "none"
+    if math.isinf(low) or math.isinf(high):
+        return f"{'at most' if math.isinf(low) else 'at least'} {high if math.isinf(low) else low:g} {unit}"
+    return f"{low:g} to {high:g} {unit}"
+
+
+def _integral_limits(side: Side) -> Pair:
+    """Return the limits of the integral term [% of the output span]; infinite where there are none."""
+    a = side.own
+    if a.integral_limits is None:
+        return -math.inf, math.inf
+    given = unlimited((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
+    gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.holds]
+    zero = side.settings.own_ranges[1].low
+    low, high = sorted((gain * x - zero) * side.op_percent for x in given)
+    return low, high
+
+
+def _or(limit: float | None, instead: float) -> float:
+    return instead if limit is None else limit
+
+
+def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+    """Yield what is done to the error, and where the integral stands still for it."""
+    figures = {
+        "error: half width of the band [% of PV span]": _of(source, target, _band),
+        "error: gain within the band [-]": _of(source, target, lambda side: _gap(side).gain if _band(side) else 1.0),
+        "error: where a gain that grows with it is 1 [% of PV span]": _of(source, target, _over),
+        "error: gain near zero [-]": _of(source, target, _linearity),
+        "integral deadband [% of PV span]": _of(source, target, lambda side: (side.own.integral_deadband or 0.0) * side.pv_percent),
+    }
+    found = {name: pair for name, pair in figures.items() if not alike(*pair)}
+    shapes = [side.own.shape for side in (source, target)]
+    if found or _fine_print(shapes[0]) != _fine_print(shapes[1]):
+        words = "; ".join(f"{side.name} {_error_words(side)}" for side in (source, target))
+        yield NonlinearDifference("error", f"The error is used differently: {words}.", found)
+
+
+def _gap(side: Side) -> Shape:
+    return side.own.shape or Shape("gap")
+
+
+def _band(side: Side) -> float:
+    return _gap(side).band * side.pv_percent if _gap(side).kind == "gap" else 0.0
+
+
+def _over(side: Side) -> float:
+    return _gap(side).over * side.pv_percent if _gap(side).kind != "gap" else math.inf
+
+
+def _linearity(side: Side) -> float:
+    """Return the gain near zero of a shape that has no band."""
+    shape = side.own.shape
+    return 1.0 if shape is None or shape.kind == "gap" else 0.0 if shape.kind == "squared" else shape.linearity
+
+
+def _fine_print(shape: Shape | None) -> tuple[object, ...]:
+    """Return what is not a number of a shape, but that of the mode in cascade."""
+    if shape is None:
+        return ()
+    return shape.kind, shape.subtracted, shape.zero_crossing, shape.on_integral, shape.on_proportional
+
+
+def _error_words(side: Side) -> str:
+    shape, band = side.own.shape, (side.own.integral_deadband or 0.0) * side.pv_percent
+    still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
+    if shape is None:
+        return still or "uses it as it is"
+    if shape.kind == "gap":
+        gain = f"multiplies it by {shape.gain:g}" if shape.gain else "takes it as zero"
+        text = f"{gain} within {_band(side):.4g} %"
+        text += ", and subtracts the band outside" if shape.subtracted else ""
+        text += ", from its first change of sign there" if shape.zero_crossing else ""
+    elif shape.kind == "squared":
+        text = f"squares it (gain 1 at {_over(side):.4g} %)"
+    else:
+        text = f"gives it a gain of {shape.linearity:g} near zero, rising to 1 at {_over(side):.4g} %"
+    where = "" if shape.on_integral and shape.on_proportional else " for the integral" if shape.on_integral else " for P"
+    return f"{text}{where}{' and ' + still if still else ''}"
+
+
+def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+    """Yield rate limit, deadband and step of the output where they differ."""
+    yield from _numbers(
+        "output",
+        (source, target),
+        {
+            "output rate limit [%/s]": _of(source, target, lambda side: side.own.output_rate * side.op_percent),
+            "output deadband [%]": _of(source, target, lambda side: side.own.output_deadband * side.op_percent),
+            "output step [%]": _of(source, target, lambda side: side.own.resolution * side.op_percent),
+        },
+        [],
+    )
+
+
+def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False) -> Iterator[NonlinearDifference]:
+    """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual.
+
+    With `in_cascade` the remote setpoint alone counts, which some do not limit.
+    """
+    words = [
+        f"On {side.name} the setpoint follows PV in manual and stays there until it is changed"
+        for side, other in ((source, target), (target, source))
+        if side.own.sp_tracks and not other.own.sp_tracks
+    ]
+    words += [
+        f"On {side.name} the rate-limited setpoint starts at zero at power-up"
+        for side, other in ((source, target), (target, source))
+        if _from_zero(side) and not _from_zero(other)
+    ]
+    free = [in_cascade and side.own.sp_rate_local for side in (source, target)]
+    up, down = (
+        tuple(math.inf if none else rate * side.pv_percent for none, rate, side in zip(free, rates, (source, target), strict=True))
+        for rates in ([s.own.sp_rate for s in (source, target)], [s.own.sp_rate_down for s in (source, target)])
+    )
+    rates = {"setpoint rate limit [%/s]": (up[0], up[1]), "setpoint rate limit downwards [%/s]": (down[0], down[1])}
+    if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(s.own.sp_rate == s.own.sp_rate_down for s in (source, target)):
+        del rates["setpoint rate limit downwards [%/s]"]
+    yield from _numbers("setpoint", (source, target), rates, words)
+
+
+def _from_zero(side: Side) -> bool:
+    return side.own.sp_from_zero and math.isfinite(side.own.sp_rate)
+
+
+def _numbers(aspect: str, both: tuple[Side, Side], figures: Figures, words: list[str]) -> Iterator[NonlinearDifference]:
+    """Yield the figures that differ as one difference, with further sentences."""
+    found = {name: pair for name, pair in figures.items() if not alike(*pair)}
+    parts = []
+    for name, pair in found.items():
+        what, unit = name.removesuffix("]").split(" [")
+        each = (f"{_or_none(x, unit)} on {side.name}" for x, side in zip(pair, both, strict=True))
+        parts.append(f"{what[0].upper()}{what[1:]}: {', '.join(each)}")
+    if parts or words:
+        yield NonlinearDifference(aspect, f"{'. '.join([*parts, *words])}.", found)
+
+
+def _or_none(x: float, unit: str) -> str:
+    return f"{x:.4g} {unit}" if x and math.isfinite(x) else "none"
+
+
+def _of(source: Side, target: Side, number: Callable[[Side], float]) -> Pair:
+    return number(source), number(target)
+
+
+def _pair(numbers: tuple[float, ...]) -> Pair:
+    return numbers[0], numbers[1]

@@ -1,0 +1,214 @@
+"""A program under way: its functions and states, and what becomes of the states when another program takes over."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from math import isfinite, isnan, nan
+from typing import Any, Final
+
+import numpy as np
+
+from pidemu.algorithm.model import Algorithm
+from pidemu.backends.choice import Choice, safe_runner
+from pidemu.backends.python import Compiled, compiled
+from pidemu.backends.runner import Runner
+from pidemu.errors import ScanError
+from pidemu.program.ir import Program
+
+_REMEMBERED: Final = 64
+"""Programs kept for other scan intervals."""
+
+
+class Running:
+    """A program with its states.
+
+    Parameters
+    ----------
+    algorithm : callable
+        From a scan interval [s] to the algorithm.
+    built : callable
+        From an algorithm and a scan interval [s] to the program.
+    interval : float
+        Nominal scan interval [s].
+
+    Attributes
+    ----------
+    program : Program
+        The program at the nominal interval.
+    compiled : Compiled
+        Its functions.
+    state : list of float
+        Its states, in its order and precision; this list is changed in place.
+    """
+
+    def __init__(
+        self, algorithm: Callable[[float], Algorithm], built: Callable[[Algorithm, float], Program], interval: float
+    ) -> None:
+        self.interval = interval
+        self.program = built(algorithm(interval), interval)
+        self.compiled: Compiled = compiled(self.program)
+        self.state: list[float] = list(self.compiled.initial)
+        self._algorithm, self._built = algorithm, built
+        self._places = {q.name: i for i, q in enumerate(self.program.states)}
+        self._others: dict[float, Compiled] = {}
+        self._runners: dict[Choice, Runner] = {}
+
+    def at(self, h: float) -> Compiled:
+        """Return the functions for another scan interval [s].
+
+        Raises
+        ------
+        ScanError
+            The algorithm has another structure there.
+        """
+        if h == self.interval:
+            return self.compiled
+        found = self._others.get(h)
+        if found is None:
+            if len(self._others) >= _REMEMBERED:
+                self._others.clear()
+            program = self._built(self._algorithm(h), h)
+            if [q.name for q in program.states] != list(self._places):
+                raise ScanError(
+                    f"the algorithm has another structure at a scan interval of {h:g} s; it cannot change while running"
+                )
+            found = self._others[h] = compiled(program)
+        return found
+
+    def runner(self, choice: Choice) -> Runner:
+        """Return the functions that run the program over a record."""
+        if choice not in self._runners:
+            self._runners[choice] = safe_runner(self.program, choice)
+        return self._runners[choice]
+
+    def reset(self) -> None:
+        """Go back to before the first scan."""
+        self.state[:] = self.compiled.initial
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._places
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.state[self._places[name]])
+
+    def __setitem__(self, name: str, value: float) -> None:
+        """Set a state, in the program's precision."""
+        place = self._places[name]
+        self.state[place] = type(self.compiled.initial[place])(value)
+
+    def named(self) -> dict[str, float]:
+        """Return the states by name."""
+        return {name: float(self.state[place]) for name, place in self._places.items()}
+
+    def not_finite(self, state: Sequence[float] | None = None) -> dict[str, float]:
+        """Return the states that are not finite numbers, by name; of these states, or of the present ones."""
+        return {name: float(x) for name, x in zip(self._places, state or self.state, strict=True) if not isfinite(x)}
+
+    def inputs(self, last: Mapping[str, float]) -> tuple[float, ...]:
+        """Return the program's inputs from signals by name; what is missing is no signal."""
+        return tuple(last.get(q.name, 0.0 if q.name == "feedforward" else nan) for q in self.program.inputs)
+
+    def quiet(self) -> contextlib.AbstractContextManager[Any]:
+        """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
+        return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
+
+    def would_be(self, last: Mapping[str, float], name: str = "u") -> float:
+        """Return what the next scan would compute under a name; nothing changes."""
+        functions = self.compiled if name == "u" else compiled(replace(self.program, output=name))
+        with self.quiet():
+            return float(functions.scan(list(self.state), *self.inputs(last)))
+
+    def computes(self, name: str) -> bool:
+        """Tell whether the program computes something under a name."""
+        return any(assign.name == name for assign in self.program.body)
+
+    def take_over(self, old: Mapping[str, float], last: Mapping[str, float]) -> None:
+        """Take over the states of the program before, by name.
+
+        States that it did not have start at rest, from the last signals; an integral that it did not have starts where the output
+        stays.
+
+        Parameters
+        ----------
+        old : mapping
+            States by name.
+        last : mapping
+            The last signals by name; empty before the first scan.
+        """
+        new = [name for name in self._places if name not in old]
+        for name in self._places.keys() & old.keys():
+            self[name] = old[name]
+        if not last or not new:
+            return
+        other = self._before_a_scan_that_moves_nothing()
+        rest = _resting(other, self._by_hand(last, old["u"]))
+        rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
+        for name in new:
+            self[name] = rest.get(name, self[name])
+        if "I" in new:
+            other.reset()
+            self["I"] = self._left_for_the_integral(other, last, old["u"])
+
+    def _before_a_scan_that_moves_nothing(self) -> Running:
+        """Return this controller before the first scan, and that one such that it moves nothing."""
+        a = self._algorithm(self.interval)
+        still = resting(a)
+        if still is not a:
+            return Running(lambda _h: still, self._built, self.interval)
+        other = copy(self)
+        other.state = list(self.compiled.initial)
+        return other
+
+    def _by_hand(self, last: Mapping[str, float], u: float) -> dict[str, float]:
+        return {**last, "auto": 0.0, "manual": u, "track": nan}
+
+    def _left_for_the_integral(self, other: Running, last: Mapping[str, float], u: float) -> float:
+        """Return the integral with which the output stays where it is; `other` is this controller at rest."""
+        if "I" not in other:  # a loaded sum without integral action
+            self["I"] = 0.0
+            return u - self.would_be(last, "v")
+        for name in other.named().keys() & self.named().keys():
+            other[name] = self[name]
+        for name in {"on", "begun"} & other.named().keys():
+            other[name] = float(name == "begun")
+        with other.quiet():
+            other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
+        return other["I"]
+
+    def keep_output(self, old: Running, last: Mapping[str, float]) -> None:
+        """Move the integral by what the proportional term becomes less, at the last signals: the listing's parameter change."""
+        if "I" in self and old.computes("P") and self.computes("P"):
+            moved = old.would_be(last, "P") - self.would_be(last, "P")
+            if not isnan(moved):
+                self["I"] += moved
+
+
+def _resting(other: Running, by_hand: Mapping[str, float]) -> dict[str, float]:
+    """Return the states of a controller that has had the last signals for ever, in manual."""
+    other["u"] = by_hand["manual"]
+    with other.quiet():
+        other.compiled.scan(other.state, *other.inputs(by_hand))
+    return other.named()
+
+
+_AT_REST: Final[Mapping[str, object]] = {
+    "start": "bumpless",
+    "first_scan_holds": False,
+    "zero_power_up": False,
+    "zero_first_output": False,
+    "derivative_start": "running",
+    "derivative_from_zero": False,
+    "integral_from_zero": False,
+    "sp_from_zero": False,
+    "manual_output": "operator",
+}
+
+
+def resting(a: Algorithm) -> Algorithm:
+    """Return the algorithm with a first scan that moves nothing and a transfer that does not bump; itself where it is so."""
+    if all(getattr(a, name) == value for name, value in _AT_REST.items()):
+        return a
+    return replace(a, **_AT_REST)  # type: ignore[arg-type]

@@ -1,0 +1,1 @@
+"""Settings whose meaning is uncertain: every reading of them."""

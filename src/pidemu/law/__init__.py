@@ -1,0 +1,1 @@
+"""The linear law: operators, fractions without rounding, power series."""

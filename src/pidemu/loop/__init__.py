@@ -1,1 +1,0 @@
-"""Process models and the closed loop."""

@@ -1,0 +1,1 @@
+"""Processes: transfer functions with dead time, and their exact response between two scans."""

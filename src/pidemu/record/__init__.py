@@ -1,1 +1,0 @@
-"""Recorded and standard signals: read, sampled, played to a controller."""

@@ -1,0 +1,1 @@
+"""Recorded signals: files, playback, the standard record, comparison of controllers."""

@@ -1,0 +1,1 @@
+"""Settings of a card: values with units, signal ranges, and reading what people type."""

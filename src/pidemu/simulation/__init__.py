@@ -1,0 +1,1 @@
+"""One closed loop of an emulated controller and a process."""

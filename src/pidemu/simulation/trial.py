@@ -1,0 +1,197 @@
+"""A trial of a closed loop: what runs, from where, for how long, and what steps when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.analysis.figures import scan_for, settling_time
+from pidemu.analysis.open_loop import low_frequency_sign
+from pidemu.controller.controller import Controller
+from pidemu.errors import ProcessError
+from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible, shown
+from pidemu.process.process import Process
+from pidemu.program.builder import Action
+from pidemu.program.ir import Program
+from pidemu.program.specialise import specialise
+from pidemu.records.playback import Timing
+from pidemu.records.sampling import Scale, controller_for, limits_for
+from pidemu.settings.settings import Settings
+from pidemu.simulation.closed import closed_loop
+
+Floats = npt.NDArray[np.float64]
+Step = tuple[float, float]
+
+_DEFAULT_SCANS: Final = 50_000
+"""The default duration ends here."""
+_MOST_SCANS: Final = 20_000_000
+_FULL: Final = (0.0, 100.0)
+_UNLIMITED: Final = (-1e12, 1e12)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A closed loop that can be run; everything is chosen and checked.
+
+    Attributes
+    ----------
+    settings : Settings
+        The controller's settings.
+    process : Process
+        The process.
+    scan : float
+        Scan interval [s].
+    scans : int
+        How many scans, the first at time 0.
+    action : {"reverse", "direct"}
+        Control action.
+    limits : tuple of float
+        Output limits [%].
+    initial : tuple of float
+        Setpoint, measurement and output before [%].
+    setpoint_step, load_step : tuple of float or None
+        When and how far setpoint and load step [s, %].
+    """
+
+    settings: Settings
+    process: Process
+    scan: float
+    scans: int
+    action: Action
+    limits: tuple[float, float]
+    initial: tuple[float, float, float]
+    setpoint_step: Step | None
+    load_step: Step | None
+
+    @property
+    def times(self) -> Floats:
+        """Times of the scans [s], shape (scans,)."""
+        return np.arange(self.scans, dtype=np.float64) * self.scan
+
+    @property
+    def setpoint(self) -> Floats:
+        """The setpoint at the scans [%], shape (scans,)."""
+        return self.initial[0] + self._signal(self.setpoint_step)
+
+    @property
+    def load(self) -> Floats:
+        """The load at the scans [%], shape (scans,)."""
+        return self._signal(self.load_step)
+
+    def first(self, at: float) -> int:
+        """Return the first scan at or after a time [s]."""
+        return first_scan(at, self.scan, self.scans)
+
+    def _signal(self, step: Step | None) -> Floats:
+        if step is None:
+            return np.zeros(self.scans)
+        return np.where(np.arange(self.scans) >= self.first(step[0]), step[1], 0.0)
+
+    def controller(self) -> Controller:
+        """Return the controller at rest; where nothing integrates, its bias is such that its output is the initial one there."""
+        settings, scale = self.settings, Scale(self.settings)
+        sp, pv = scale.signals_own(np.array(self.initial[:2])).tolist()
+        output = scale.output_own(self.initial[2])
+        controller, biased = controller_for(settings, Timing(self.scan), self.action, self.limits, self.initial[2])
+        if biased:
+            trial, _ = controller_for(settings, Timing(self.scan), self.action, _UNLIMITED, self.initial[2])
+            trial.rest(sp, pv, output)
+            bias = 2 * output - trial.scan(sp, pv)
+            own = (scale.output_own(self.limits[0]), scale.output_own(self.limits[1]))
+            controller = Controller(settings, self.scan, self.action, own, bias=bias, initial_output=output)
+        controller.rest(sp, pv, output)
+        return controller
+
+    def program(self, controller: Controller) -> Program:
+        """Return the closed loop of a controller at rest (`pidemu.simulation.closed.closed_loop`)."""
+        at_rest = replace(controller.program, initial=tuple(controller.state.values()))
+        pv_span, output_span = Scale(self.settings).spans
+        rest = (self.initial[1], self.initial[2])
+        return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, pv_span, output_span)
+
+
+def first_scan(at: float, scan: float, scans: int) -> int:
+    """Return the first scan at or after a time [s], of so many; their number where there is none.
+
+    Parameters
+    ----------
+    at : float
+        The time [s]; a scan that rounding puts just before it counts.
+    scan : float
+        Scan interval [s]; scan `n` is at ``n scan``.
+    scans : int
+        How many scans.
+    """
+    least = at * (1 - 1e-12)
+    n = min(max(0, math.ceil(least / scan) - 1), scans)
+    while n < scans and n * scan < least:
+        n += 1
+    return n
+
+
+def trial(
+    settings: Settings,
+    process: Process,
+    scan: float | None = None,
+    *,
+    setpoint: float | Step = 10.0,
+    load: float | Step = 10.0,
+    time: float | None = None,
+    action: Action | None = None,
+    output_limits: tuple[float, float] | None = None,
+    initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
+) -> Trial:
+    """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
+    h = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
+    if not h > 0:
+        raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
+    length = _duration(settings, process, h) if time is None else plausible("time", time, TIME, ProcessError)
+    if not h <= length < _MOST_SCANS * h:
+        raise ProcessError(
+            f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses, "
+            f"{h:g} s to {_MOST_SCANS * h:g} s"
+        )
+    sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
+    chosen = action or _negative_feedback(settings, process)
+    limits = limits_for(settings, output_limits, _FULL)
+    if not limits[0] < limits[1]:  # not a number compares false as well
+        raise ProcessError(f"output limits {limits[0]:g} to {limits[1]:g} % are not a range; give low, then high, such as (0, 100)")
+    if not limits[0] <= initial[2] <= limits[1]:
+        raise ProcessError(
+            f"the initial output {initial[2]:g} % is outside the output limits {limits[0]:g} to {limits[1]:g} %; give another, or "
+            f"other limits such as output_limits=(0, 100)"
+        )
+    scans = math.floor(length / h * (1 + 1e-12)) + 1
+    return Trial(settings, process, h, scans, chosen, limits, initial, sp_step, load_step)
+
+
+def _duration(settings: Settings, process: Process, h: float) -> float:
+    return min(2 * settling_time(settings, process, h), _DEFAULT_SCANS * h)
+
+
+def _negative_feedback(settings: Settings, process: Process) -> Action:
+    """Return the action with which the feedback is negative."""
+    right = process.feedback_sign * low_frequency_sign(settings.algorithm()) >= 0
+    if not right and settings.equation.action.fixed:
+        raise ProcessError(
+            f"{settings.card.id} has no choice of control action, and with the sign of its gain the feedback from {process} would "
+            f"be positive; give the gain the other sign"
+        )
+    return "reverse" if right else "direct"
+
+
+def _step(name: str, given: float | Step, at: float, end: float) -> Step | None:
+    """Return when and how far a signal steps, or ``None`` where it does not."""
+    if isinstance(given, str) or (isinstance(given, Sequence) and len(given) != 2):
+        raise ProcessError(f"{name} is {shown(given)}; give the size of the step in %, or (time, size)")
+    moment, step = given if isinstance(given, Sequence) else (at, given)
+    size = plausible(f"the size of the {name} step", step, LEVEL, ProcessError)
+    when = plausible(f"the time of the {name} step", moment, TIME, ProcessError)
+    if not 0 <= when < end:
+        raise ProcessError(f"a {name} step of {size:g} % at {when:g} s is not within the {end:g} s simulated; start it earlier")
+    return (when, size) if size else None
