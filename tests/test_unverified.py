@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pidemu
-from pidemu.settings.unverified import facts, unverified_law, unverified_program
+from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 
 
 def law_paths(card: str, *, rules: bool = False, **given: object) -> list[str]:

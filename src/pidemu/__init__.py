@@ -16,18 +16,17 @@ if TYPE_CHECKING:
     from pidemu.conversion.ambiguity.readings import Reading, readings
     from pidemu.conversion.convert import convert
     from pidemu.conversion.questions import Answer, Question
+    from pidemu.conversion.refused import ConversionRefusedError, QuestionError
     from pidemu.conversion.result import Conversion
     from pidemu.conversion.verify import Verification, verify
     from pidemu.errors import (
         ActionError,
         CardError,
         CertificateError,
-        ConversionRefusedError,
         EngineError,
         FleetError,
         PidemuError,
         ProcessError,
-        QuestionError,
         RecordError,
         ScanError,
         SettingError,
@@ -66,12 +65,12 @@ _HOMES = {
     "ActionError": "errors",
     "CardError": "errors",
     "CertificateError": "errors",
-    "ConversionRefusedError": "errors",
+    "ConversionRefusedError": "conversion.refused",
     "EngineError": "errors",
     "FleetError": "errors",
     "PidemuError": "errors",
     "ProcessError": "errors",
-    "QuestionError": "errors",
+    "QuestionError": "conversion.refused",
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",

@@ -17,6 +17,8 @@
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
         └── QuestionError         what was given can mean several things, and the result depends on which; holds the questions
+
+The last two hold conversions and questions, and stand with them in `pidemu.conversion.refused`.
 """
 
 from __future__ import annotations
@@ -24,14 +26,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 from pidemu.excerpt import excerpt, shortened, visible
-
-if TYPE_CHECKING:
-    from pidemu.conversion.questions import Question
-    from pidemu.conversion.result import Conversion
-
 
 MOST_PROBLEMS: Final = 50
 """Problems of one file that are told one by one."""
@@ -166,50 +163,6 @@ class CertificateError(PidemuError):
 
 class ProcessError(PidemuError):
     """A process model cannot be one, or a controller cannot close a loop with it."""
-
-
-class ConversionRefusedError(PidemuError):
-    """The target cannot reproduce the source.
-
-    Attributes
-    ----------
-    nearest : Conversion or None
-        The nearest settings inside the target's ranges, with the certificate that states their cost;
-        ``None`` where the target has no settings that come near.
-    alternatives : tuple of str
-        What could do instead, such as another block or option.
-    """
-
-    def __init__(self, message: str, nearest: Conversion | None = None, alternatives: Iterable[str] = ()) -> None:
-        super().__init__(message)
-        self.nearest = nearest
-        self.alternatives = tuple(alternatives)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values, the form of ``pidemu convert --json``."""
-        from pidemu.conversion.document import refusal_document
-
-        return refusal_document(self)
-
-
-class QuestionError(ConversionRefusedError):
-    """What was given can mean several things, and the result depends on which.
-
-    Attributes
-    ----------
-    questions : tuple of Question
-        What to answer, each with its readings, what they would give, and their commands.
-    """
-
-    def __init__(self, questions: Iterable[Question]) -> None:
-        self.questions = tuple(questions)
-        super().__init__("\n".join(q.text for q in self.questions))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values, the form of ``pidemu convert --json``."""
-        from pidemu.conversion.document import question_document
-
-        return question_document(self)
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

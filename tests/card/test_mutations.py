@@ -19,7 +19,8 @@ from pidemu.card.document import Path_
 from pidemu.card.library import card_files, load_card
 from pidemu.card.load import Card, load_file, variants
 from pidemu.checks.runs import plausible
-from pidemu.errors import CardError, ConversionRefusedError, PidemuError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import CardError, PidemuError
 from tests.card.mutations import ABSURD, changed, document, scalars, written_out, wrong_names
 from tests.cli.helpers import said
 

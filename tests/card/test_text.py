@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.datasheet.at_limits import limit_rows
 from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
 from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.load import Card, Variant
+from pidemu.card.model.card_file import default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import UndefinedError
 from pidemu.settings.settings import Settings, limits

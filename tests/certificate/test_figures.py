@@ -19,7 +19,7 @@ from pidemu.certificate.figures import decibels, degrees, percent
 from pidemu.certificate.linear import certify, differences, time_scale
 from pidemu.certificate.models import Kick, PathComparison
 from pidemu.cli import cli
-from pidemu.errors import ConversionRefusedError
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.settings.settings import Settings
 from tests.checks.bench import edited
 from tests.conversion.support import Floats, continuous, difference, settings_that_act

@@ -18,7 +18,8 @@ import pidemu
 from pidemu.certificate.linear import certify
 from pidemu.certificate.models import EXACT
 from pidemu.certificate.proof import Proof, prove
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import SettingError
 from pidemu.settings.settings import Settings
 from tests.conversion.exact_pairs import EXACT as EXACT_PAIRS
 from tests.conversion.exact_pairs import FEEDBACK, Pair

@@ -9,17 +9,8 @@ from typing import Any
 import pytest
 
 import pidemu
-from pidemu.certificate.models import (
-    Band,
-    Certificate,
-    Kick,
-    LoopComparison,
-    LoopFigures,
-    NonlinearDifference,
-    PathComparison,
-    ScanByScan,
-    ScanCost,
-)
+from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
+from pidemu.certificate.models import Band, Certificate, Kick, NonlinearDifference, PathComparison, ScanByScan, ScanCost
 from pidemu.certificate.sentence import sentence
 
 EXACT = "The new controller does what the old one did, for disturbances and for setpoint changes."

@@ -9,7 +9,8 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import ScanError
 from pidemu.settings.settings import Settings
 from tests.conversion.support import needed, settings_that_act
 from tests.conversion.usual import CARDS

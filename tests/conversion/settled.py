@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError
 from pidemu.settings.settings import Settings
 from tests.conversion.support import HUNDRED
 

@@ -10,7 +10,8 @@ import pytest
 
 import pidemu
 from pidemu.card.model.base import Rule
-from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import PidemuError, ScanError, SettingError
 from pidemu.settings.action import switch_position
 from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Role

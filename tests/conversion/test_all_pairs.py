@@ -14,8 +14,9 @@ import pidemu
 from pidemu.card.model.base import Status
 from pidemu.certificate.linear import bands
 from pidemu.conversion.evidence import filter_status
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.errors import ScanError
 from pidemu.settings.settings import Settings, limits
 from tests.conversion.support import difference, needed, outputs, random_signal, rules, settings_that_act
 from tests.conversion.usual import CARDS, SOURCES

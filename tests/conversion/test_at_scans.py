@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.card.load import Card
-from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import ScanError
 from pidemu.settings.settings import Settings
 from tests.conversion.support import Floats, difference, outputs, random_signal
 from tests.helpers import WIDE, made_up_card

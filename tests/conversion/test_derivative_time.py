@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import SettingError
 from tests.checks.bench import ALPHA, ALPHA_EVIDENCE, VALID, Edit, edited, written
 
 EXACT = 1e-9

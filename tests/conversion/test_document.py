@@ -14,7 +14,7 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.errors import ConversionRefusedError, QuestionError
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.process.process import Process
 from tests.cli.helpers import said, strict_json
 from tests.conversion.commands import CONVERSIONS, OTHERS

@@ -10,7 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.errors import ConversionRefusedError, ScanError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import ScanError
 from tests.conversion.exact_pairs import EXACT, FEEDBACK, OTHER_RULE, PROVOX, SCAN, Pair
 from tests.conversion.support import HUNDRED, Floats, difference, outputs, random_signal, rules, settings_that_act
 

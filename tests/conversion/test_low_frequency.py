@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.errors import ConversionRefusedError
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.conversion.support import HUNDRED, Floats, outputs, settings_that_act

@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 
 import pidemu
 from pidemu.conversion.match_method import MATCHES
-from pidemu.errors import ConversionRefusedError, SettingError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import SettingError
 from pidemu.settings.settings import Settings
 from tests.conversion.support import Complex, Floats, continuous
 from tests.helpers import made_up_card

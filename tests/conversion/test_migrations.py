@@ -7,8 +7,8 @@ import math
 import pytest
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError, QuestionError
 from tests.conversion.migrations import CASES, Migration, Typed
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.errors import ConversionRefusedError, PidemuError, ScanError, SettingError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import PidemuError, ScanError, SettingError
 from tests.checks.bench import VALID, edited, written
 from tests.conversion.support import HUNDRED, needed
 from tests.conversion.usual import CARDS, SOURCES, usual

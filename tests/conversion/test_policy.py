@@ -9,8 +9,9 @@ from typing import ClassVar
 import pytest
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError, QuestionError, SettingError
+from pidemu.errors import SettingError
 
 PROVOX: dict[str, object] = {"GAIN": 2, "RESET": 4, "RATE": 0.1}
 IDEAL_TDC: dict[str, object] = {"K": 0.5, "T1": 0.1, "FORM": "ideal", "CTEQN": "A"}

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.certificate.models import EXACT
-from pidemu.errors import ConversionRefusedError, PidemuError
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import PidemuError
 from pidemu.process.process import parse_process
 from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Role

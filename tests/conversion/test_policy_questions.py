@@ -13,9 +13,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.target import is_computed
 from pidemu.conversion.unstated import unstated
-from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError, ScanError, SettingError
+from pidemu.errors import PidemuError, ScanError, SettingError
 from pidemu.formatting import json_safe
 from pidemu.process.process import parse_process
 from pidemu.settings.settings import Settings

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError, PidemuError, SettingError
+from pidemu.errors import PidemuError, SettingError
 from pidemu.settings.settings import Settings, limits
 from pidemu.units import Role, from_canonical, parse_unit
 

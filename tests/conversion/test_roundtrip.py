@@ -10,9 +10,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
-from pidemu.errors import ConversionRefusedError
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.conversion.support import needed, settings_that_act

@@ -10,9 +10,9 @@ import pytest
 
 import pidemu
 from pidemu import Controller, Settings
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.load import Card
 from pidemu.card.model.base import Form
+from pidemu.card.model.card_file import default_scan
 from pidemu.card.references import is_active
 from pidemu.cutover.plan import TransferPlan, transfer_plan
 from pidemu.errors import SettingError

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.library import card_files
+from pidemu.card.model.card_file import default_scan
 from pidemu.errors import ScanError
 from pidemu.explanation.forms import Times
 from pidemu.law.law import Law

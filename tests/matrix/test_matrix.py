@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.unstated import unstated
-from pidemu.errors import CardNotFoundError, ConversionRefusedError, SettingError
+from pidemu.errors import CardNotFoundError, SettingError
 from pidemu.matrix import cell as cell_module
 from pidemu.matrix.cell import Cell, Work
 from pidemu.matrix.matrix import COLUMNS, Matrix, counts, matrix

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.errors import SettingError
-from pidemu.program.builder import Action
+from pidemu.settings.action import Action
 from tests.real.support import Signals, close, outputs, signals, trace
 
 TOLERANCE = 1e-12

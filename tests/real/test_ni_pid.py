@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.program.builder import Action
+from pidemu.settings.action import Action
 from tests.real.support import Floats, Signals, close, signals
 
 TOLERANCE = 1e-12

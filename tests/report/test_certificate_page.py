@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.card.library import ENVIRONMENT
 from pidemu.certificate.models import Band
+from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 from pidemu.conversion.convert import convert
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.statement import condition_line, sections
@@ -32,7 +33,6 @@ from pidemu.process.process import Process, parse_process
 from pidemu.process.text import written
 from pidemu.report.certificate import certificate_page, write_page
 from pidemu.report.curves import bode, closed_loops, responses
-from pidemu.settings.unverified import facts, unverified_law, unverified_program
 from tests.cli.helpers import said, strict_json, told
 from tests.conversion.support import continuous, outputs
 from tests.helpers import made_up_card

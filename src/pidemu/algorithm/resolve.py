@@ -8,7 +8,7 @@ from typing import Any
 
 from pidemu.algorithm.model import Algorithm, Dahlin, Gate, Lag, Place, Shape
 from pidemu.card.model.base import Form, Rule
-from pidemu.card.model.card_file import Equation
+from pidemu.card.model.card_file import Equation, default_scan, gain_sign
 from pidemu.card.model.integral import (
     FastReturn,
     IntegralLimits,
@@ -20,18 +20,7 @@ from pidemu.card.model.integral import (
 from pidemu.card.model.terms import ErrorShape, Filter, Measurement, Setpoint
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.settings.settings import Settings
-from pidemu.units import Dimension, Role, Spans, parse_quantity, parse_unit, to_canonical
-
-
-def default_scan(equation: Equation) -> float:
-    """Return the card's scan interval [s]."""
-    number, unit = parse_quantity(equation.scan.default)
-    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
-
-
-def gain_sign(equation: Equation) -> float:
-    """Return -1 where a positive gain is direct acting (`action.fixed` with ``pv - sp``), else 1."""
-    return -1.0 if equation.action.fixed and equation.action.reverse == "pv - sp" else 1.0
+from pidemu.units import Dimension, Role, Spans, parse_unit, to_canonical
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm.resolve import default_scan
+from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.analysis.open_loop import PER_DECADE, OpenLoop, Picture, picture_of
-from pidemu.certificate.models import LoopFigures
+from pidemu.card.model.card_file import default_scan
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process

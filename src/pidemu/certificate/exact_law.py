@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing import Any, Final, Literal, cast
 
 from pidemu.algorithm.model import Algorithm, Lag
-from pidemu.algorithm.resolve import Reader, algorithm_as_read, default_scan
+from pidemu.algorithm.resolve import Reader, algorithm_as_read
+from pidemu.card.model.card_file import default_scan
 from pidemu.law import law as laws
 from pidemu.law.exact import Exact, as_typed, exact
 from pidemu.law.rational import Rational, add, multiply

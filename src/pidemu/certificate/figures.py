@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pidemu.certificate.models import EXACT, Band, Certificate, LoopComparison, PathComparison
+from pidemu.analysis.loop_figures import LoopComparison
+from pidemu.certificate.models import EXACT, Band, Certificate, PathComparison
 from pidemu.units import Role
 
 if TYPE_CHECKING:
-    from pidemu.conversion.result import Conversion
     from pidemu.settings.settings import Value
 
 BAND_COLUMNS: Final = ("path", "band", "rad/s", "deviation", "gain", "phase")
@@ -138,19 +138,6 @@ def rounding_line(c: Certificate, digits: int | None) -> str:
         return f"{words}: {'without effect' if off < EXACT else f'within {percent(off)}'}"
     old, new = (percent(p.loop_band.max_deviation) for p in (before, c.headline))
     return f"{words}: {new} in the loop band, {'as before' if old == new else f'instead of {old}'}"
-
-
-def textbook_line(c: Conversion) -> str:
-    """Return how near the textbook rule would come; nothing where it is what was used."""
-    book = c.textbook
-    if book.certificate is None:
-        return f"the textbook rule has no answer: {book.reason}"
-    if c.match == "textbook":
-        return ""
-    band = book.certificate.feedback.loop_band
-    if band.max_deviation < EXACT:
-        return "the textbook rule gives the same law for measurement"
-    return f"the textbook rule would deviate by {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band"
 
 
 def _four_digits(x: float, instead: str = "-") -> str:

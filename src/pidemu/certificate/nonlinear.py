@@ -53,8 +53,8 @@ def nonlinear_differences(
     scans : tuple of float
         Their scan intervals [s].
     time_and_size : tuple of float
-        Characteristic time [s] and size [%] of the standard record, as `pidemu.records.standard.scale_of` gives them for the source.
-        A time of more than 2,000 scans of the faster, or less than 20 of the slower controller gives way to that.
+        Characteristic time [s] and size [%] of the standard record, as `pidemu.records.standard.scale_of` gives them for the
+        source. A time of more than 2,000 scans of the faster, or less than 20 of the slower controller gives way to that.
     limits : tuple of float, optional
         Output limits that both are set to [% of the output span]; by default the source card's.
     in_cascade : bool

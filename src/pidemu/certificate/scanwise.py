@@ -9,16 +9,15 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm.resolve import default_scan
+from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.linear import time_scale
 from pidemu.certificate.models import EXACT, ScanByScan
 from pidemu.errors import ScanError
-from pidemu.program.builder import Action
 from pidemu.records.files import Record
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for
 from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
-from pidemu.settings.action import acting_alike
+from pidemu.settings.action import Action, acting_alike
 from pidemu.settings.settings import Settings
 
 Floats = npt.NDArray[np.float64]

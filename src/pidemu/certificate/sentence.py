@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from pidemu.certificate.models import COARSE, Certificate, Kick, LoopComparison, ScanCost
+from pidemu.analysis.loop_figures import LoopComparison
+from pidemu.certificate.models import COARSE, Certificate, Kick, ScanCost
 
 
 def sentence(c: Certificate, conditions: Sequence[str] = (), assumed: Sequence[str] = (), lag: str = "") -> str:

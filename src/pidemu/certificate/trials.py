@@ -13,11 +13,11 @@ from pidemu.certificate.scaled_controller import Side
 from pidemu.certificate.scanwise import WIDE
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats, Record
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for
 from pidemu.records.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
+from pidemu.settings.action import Action
 
 _MOST_SCANS: Final = 2000
 """The characteristic time is at most this many scans: it is a figure that is wanted, not a plot."""

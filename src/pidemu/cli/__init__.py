@@ -10,7 +10,8 @@ from typing import Final
 import click
 
 from pidemu.cli import interrupts, streams
-from pidemu.errors import CardError, CardNotFoundError, ConversionRefusedError, PidemuError, suggest
+from pidemu.conversion.refused import ConversionRefusedError
+from pidemu.errors import CardError, CardNotFoundError, PidemuError, suggest
 from pidemu.excerpt import printable
 
 _COMMANDS: Final = {

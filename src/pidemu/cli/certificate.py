@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pidemu.analysis.loop_figures import LoopComparison
 from pidemu.card.load import Card
 from pidemu.certificate.figures import (
     BAND_COLUMNS,
@@ -15,10 +16,11 @@ from pidemu.certificate.figures import (
     rounding_line,
     unit_of,
 )
-from pidemu.certificate.models import EXACT, LoopComparison
+from pidemu.certificate.models import EXACT
 from pidemu.cli.common import echo, heading, number, print_json, table, wrapped
 from pidemu.conversion.document import refusal_document
 from pidemu.conversion.explain import explained
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.statement import (
     bump_line,
@@ -34,7 +36,6 @@ from pidemu.conversion.statement import (
     source_rows,
     target_rows,
 )
-from pidemu.errors import ConversionRefusedError
 from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:

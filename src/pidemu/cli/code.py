@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from pidemu.card.library import load_card
+from pidemu.certificate.unverified import facts, unverified_program
 from pidemu.cli.common import Output, action_option, assignments, echo, limits_option, vendors_option
 from pidemu.cli.outputs import inputs
 from pidemu.controller.controller import Controller
@@ -18,7 +19,6 @@ from pidemu.files.reading import reason
 from pidemu.files.writing import beside
 from pidemu.program.ir import Program
 from pidemu.settings.settings import Settings
-from pidemu.settings.unverified import facts, unverified_program
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")

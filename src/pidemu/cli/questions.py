@@ -5,9 +5,9 @@ from __future__ import annotations
 from pidemu.cli.common import echo, number, print_json
 from pidemu.conversion.document import question_document
 from pidemu.conversion.questions import Question
+from pidemu.conversion.refused import QuestionError
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.target import is_computed
-from pidemu.errors import QuestionError
 from pidemu.settings.settings import Settings
 
 

@@ -13,9 +13,9 @@ from pidemu.cli.questions import print_questions
 from pidemu.conversion.ambiguity.readings import Apart, Reading, apart, command_line
 from pidemu.conversion.convert import convert
 from pidemu.conversion.questions import Answer, Question
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.request import read_request
 from pidemu.conversion.result import Conversion
-from pidemu.errors import ConversionRefusedError, QuestionError
 
 
 def refuse_to_choose(

@@ -34,9 +34,9 @@ from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.formatting import json_safe
 from pidemu.plausible import plain_number
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats, Record, read_record, write_record
 from pidemu.records.playback import Playback, Timing, far_out, play, timing
+from pidemu.settings.action import Action
 
 
 @click.command("run", short_help="Run a card on recorded signals.")

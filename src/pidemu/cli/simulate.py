@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import click
 
+from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.backends.choice import Choice, checked
 from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
-from pidemu.certificate.models import LoopFigures
 from pidemu.cli.common import (
     Output,
     Pair,
@@ -37,8 +37,8 @@ from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
 from pidemu.formatting import json_safe
 from pidemu.process.process import parse_process
-from pidemu.program.builder import Action
 from pidemu.records.files import Record, write_record
+from pidemu.settings.action import Action
 from pidemu.simulation.outcome import has_settled, margins_of, stability_of
 from pidemu.simulation.simulate import run_trial
 from pidemu.simulation.trial import Step, Trial, trial

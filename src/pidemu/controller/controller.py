@@ -11,16 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.algorithm.resolve import default_scan
 from pidemu.backends.choice import Choice, Engine, checked, for_record
 from pidemu.card.model.around import Faults
+from pidemu.card.model.card_file import default_scan
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, stretches
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.plausible import INTERVAL, LEVEL, SIGNAL, number, plausible, shown
-from pidemu.program.builder import Action, build
+from pidemu.program.builder import build
 from pidemu.program.ir import Program
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:

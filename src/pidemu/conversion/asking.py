@@ -12,10 +12,11 @@ from pidemu.conversion.command import words_for
 from pidemu.conversion.modes import depends_on_mode
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.questions import Answer, Question
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.spans import range_questions, rescaling
 from pidemu.conversion.unstated import Alternative, Open
-from pidemu.errors import ConversionRefusedError, PidemuError, QuestionError
+from pidemu.errors import PidemuError
 from pidemu.settings.action import carried_action, check_action
 from pidemu.settings.range_relation import RangeQuestion
 from pidemu.settings.settings import Settings

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
+from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.asking import (
@@ -36,6 +36,7 @@ from pidemu.conversion.refusals import (
     refuse_two_intervals,
     what_holds,
 )
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
@@ -43,11 +44,10 @@ from pidemu.conversion.solve import Solver
 from pidemu.conversion.spans import rescaling
 from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
-from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.errors import ScanError, SettingError
 from pidemu.law.exact import as_typed
-from pidemu.program.builder import Action
 from pidemu.records.sampling import Scale
-from pidemu.settings.action import switch_position
+from pidemu.settings.action import Action, switch_position
 from pidemu.settings.ranges import RangeGiven
 from pidemu.settings.settings import Settings, Value, limits
 from pidemu.units import Role, from_canonical, parse_unit

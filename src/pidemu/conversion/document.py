@@ -13,8 +13,8 @@ import pidemu
 from pidemu.formatting import json_safe
 
 if TYPE_CHECKING:
+    from pidemu.conversion.refused import ConversionRefusedError, QuestionError
     from pidemu.conversion.result import Conversion
-    from pidemu.errors import ConversionRefusedError, QuestionError
     from pidemu.settings.settings import Settings
 
 SCHEMA: Final = "pidemu-conversion-1"

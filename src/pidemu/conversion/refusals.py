@@ -7,9 +7,10 @@ from pidemu.card.load import Card
 from pidemu.card.model.base import Form
 from pidemu.certificate.scanwise import common_interval
 from pidemu.conversion.merit import forgets
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.rounding import rounded
-from pidemu.errors import ConversionRefusedError, ScanError, SettingError
+from pidemu.errors import ScanError, SettingError
 from pidemu.settings.action import carried_action
 from pidemu.settings.settings import Settings, off_values
 from pidemu.units import Role

@@ -16,8 +16,7 @@ from pidemu.errors import ScanError, SettingError
 from pidemu.formatting import exactly
 from pidemu.plausible import INTERVAL, LEVEL, number, plausible, shown
 from pidemu.process.text import written
-from pidemu.program.builder import Action
-from pidemu.settings.action import read_action
+from pidemu.settings.action import Action, read_action
 from pidemu.settings.parse import signal_range
 from pidemu.settings.ranges import RANGES, SignalRange, option_of, read_range
 

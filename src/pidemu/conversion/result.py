@@ -12,6 +12,7 @@ from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
+from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
@@ -23,11 +24,9 @@ from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
-from pidemu.program.builder import Action
 from pidemu.records.sampling import Scale
-from pidemu.settings.action import ACTIONS, action_line, action_words, carried_action
+from pidemu.settings.action import ACTIONS, Action, action_line, action_words, carried_action
 from pidemu.settings.settings import Settings
-from pidemu.settings.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.certificate.proof import Proof

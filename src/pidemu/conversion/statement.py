@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
-from pidemu.certificate.figures import emulation_line, kick_line, number, other_units, textbook_line, unit_of
+from pidemu.certificate.figures import decibels, degrees, emulation_line, kick_line, number, other_units, percent, unit_of
+from pidemu.certificate.models import EXACT
+from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 from pidemu.conversion.conditions import Condition
 from pidemu.conversion.target import is_computed
 from pidemu.settings.settings import Settings, Value
-from pidemu.settings.unverified import facts, unverified_law, unverified_program
 
 if TYPE_CHECKING:
     from pidemu.conversion.result import Conversion
@@ -145,7 +146,7 @@ def condition_line(condition: Condition) -> str:
 
 def figure_lines(c: Conversion) -> list[str]:
     """Return what stands below the table of figures."""
-    return [line for line in (emulation_line(c.certificate), kick_line(c.certificate), textbook_line(c)) if line]
+    return [line for line in (emulation_line(c.certificate), kick_line(c.certificate), _textbook_line(c)) if line]
 
 
 def proof_lines(c: Conversion) -> tuple[str, ...]:
@@ -170,3 +171,16 @@ def unverified(c: Conversion) -> list[str]:
         statements = [*unverified_law(s, rules=True, action=True), *program]
         found += [f"{s.card.id}: {fact}" for fact in facts(x for x in statements if x.key not in keys)]
     return list(dict.fromkeys(found))
+
+
+def _textbook_line(c: Conversion) -> str:
+    """Return how near the textbook rule would come; nothing where it is what was used."""
+    book = c.textbook
+    if book.certificate is None:
+        return f"the textbook rule has no answer: {book.reason}"
+    if c.match == "textbook":
+        return ""
+    band = book.certificate.feedback.loop_band
+    if band.max_deviation < EXACT:
+        return "the textbook rule gives the same law for measurement"
+    return f"the textbook rule would deviate by {percent(band.max_deviation)}, {decibels(band)}, {degrees(band)} in the loop band"

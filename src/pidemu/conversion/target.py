@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import Any, Final, Literal
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.algorithm.resolve import default_scan, gain_sign
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.base import Form, Rule
-from pidemu.card.model.card_file import Equation, Setting
+from pidemu.card.model.card_file import Equation, Setting, default_scan, gain_sign
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
 from pidemu.settings.ranges import SignalRange

@@ -17,10 +17,11 @@ from pidemu.card.load import Card
 from pidemu.certificate.figures import number
 from pidemu.conversion.convert import convert
 from pidemu.conversion.document import card_versions
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.schema import AsGiven, Asked, Dial
 from pidemu.conversion.signed import Signed, read_signed
-from pidemu.errors import CardNotFoundError, CertificateError, ConversionRefusedError, PidemuError, QuestionError
+from pidemu.errors import CardNotFoundError, CertificateError, PidemuError
 
 DIAL: Final = 1e-6
 """Relative difference up to which a dial is the same: optimisers and other processors end that near, and no dial is set finer."""

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from math import copysign, isfinite
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.algorithm.resolve import default_scan
+from pidemu.card.model.card_file import default_scan
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.program.builder import Action
-from pidemu.settings.action import switch_position
+from pidemu.settings.action import Action, switch_position
 from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings, Value
 from pidemu.units import FULL, Role, from_canonical, parse_unit

@@ -13,15 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.model.base import Rule
+from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for
-from pidemu.settings.action import carried_action, switch_position
+from pidemu.settings.action import Action, carried_action, switch_position
 from pidemu.settings.settings import Settings
 
 STEPS: Final = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)

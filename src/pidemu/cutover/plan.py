@@ -12,8 +12,7 @@ from pidemu.cutover.trials import NO_BUMP, cut_over, resolution
 from pidemu.cutover.ways import best_way, simple_way
 from pidemu.errors import ActionError, ScanError
 from pidemu.formatting import json_safe
-from pidemu.program.builder import Action
-from pidemu.settings.action import ACTIONS, action_line, action_words, carried_action, check_action
+from pidemu.settings.action import ACTIONS, Action, action_line, action_words, carried_action, check_action
 from pidemu.settings.settings import Settings
 
 

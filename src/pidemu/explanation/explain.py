@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.algorithm.resolve import default_scan
 from pidemu.analysis.open_loop import low_frequency_sign
 from pidemu.card.model.base import LARGEST, SMALLEST, Form
+from pidemu.card.model.card_file import default_scan
+from pidemu.certificate.unverified import facts, unverified_law
 from pidemu.errors import ScanError
 from pidemu.explanation.dials import dials_of, not_stated, ranges_missing
 from pidemu.explanation.forms import Forms, Times, forms_of
@@ -16,7 +17,6 @@ from pidemu.explanation.model import Explanation, FilterFacts, Mode
 from pidemu.explanation.responses import ramp_of, responses_of
 from pidemu.explanation.words import action_sentence, summary_of
 from pidemu.settings.settings import Settings
-from pidemu.settings.unverified import facts, unverified_law
 
 
 def explain(settings: Settings, scan: float | None = None) -> Explanation:

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pidemu.certificate.unverified import Fact
 from pidemu.explanation.forms import Forms
 from pidemu.explanation.responses import Ramp, Responses
 from pidemu.formatting import json_safe
-from pidemu.settings.unverified import Fact
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pidemu.backends.choice import Engine
 from pidemu.errors import FleetError
 from pidemu.process.process import Process
-from pidemu.program.builder import Action
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.trial import Step, Trial, trial
 

@@ -7,7 +7,7 @@ import gc
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from pidemu.certificate.models import LoopFigures
+from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.errors import PidemuError
 from pidemu.fleet.loops import Loop, Plan
 from pidemu.program.ir import Program, Structure

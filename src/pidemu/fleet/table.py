@@ -17,7 +17,7 @@ from pidemu.fleet.prepare import reason_of
 from pidemu.fleet.result import HEADER, FleetResult
 from pidemu.parsing import assignments, pair, seconds, step
 from pidemu.process.process import parse_process
-from pidemu.program.builder import Action
+from pidemu.settings.action import Action
 
 COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
 """Columns of a file of loops."""

@@ -12,11 +12,11 @@ from pidemu.certificate.models import EXACT, PathComparison
 from pidemu.conversion.command import words_for
 from pidemu.conversion.convert import convert
 from pidemu.conversion.modes import Modes, depends_on_mode
+from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.spans import ranges_needed
 from pidemu.conversion.target import is_computed
-from pidemu.errors import ConversionRefusedError, QuestionError
 from pidemu.formatting import json_safe
 from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.settings.ranges import RANGES, SignalRange

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pidemu.card.library import card_files, load_card
-from pidemu.errors import ConversionRefusedError
+from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.files.tables import write_rows
 from pidemu.matrix.cell import OUTCOMES, Cell, Work
 from pidemu.matrix.pairs import computed

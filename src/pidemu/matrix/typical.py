@@ -8,10 +8,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
-from pidemu.algorithm.resolve import default_scan, gain_sign
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.model.base import Form
-from pidemu.card.model.card_file import Equation, Setting
+from pidemu.card.model.card_file import Equation, Setting, default_scan, gain_sign
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.conversion.target import is_computed

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -22,8 +21,7 @@ from pidemu.program.ir import Program
 from pidemu.program.positional import positional
 from pidemu.program.terms import terms
 from pidemu.program.velocity import velocity
-
-Action = Literal["reverse", "direct"]
+from pidemu.settings.action import Action
 
 
 def build(

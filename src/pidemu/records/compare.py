@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from pidemu.algorithm.resolve import default_scan
+from pidemu.card.model.card_file import default_scan
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats, Record, read_record
 from pidemu.records.playback import even_step
 from pidemu.records.sampling import Scale, limits_for, mode_segments
 from pidemu.records.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, run_on
 from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 
 
@@ -122,7 +122,8 @@ def compare(
     settings : sequence of Settings
         The controllers' settings, two or more.
     record : Record or path, optional
-        Recorded signals; by default the standard record (`pidemu.records.standard.standard_record`), scaled to the first controller.
+        Recorded signals; by default the standard record (`pidemu.records.standard.standard_record`), scaled to the first
+        controller.
     scan : float or sequence of float, optional
         Scan interval of all, or of each [s]; by default the record's, else that of the first card. A controller whose interval is
         not the record's reads what was recorded last.

@@ -12,10 +12,10 @@ import numpy as np
 
 from pidemu.controller.controller import Controller
 from pidemu.errors import RecordError
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats, Record
 from pidemu.records.playback import Timing, even_step, modes, spells, times_of, timing
 from pidemu.records.standard import Segment, StandardRecord, standard_record
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 
 _LIKE_PV = ("sp", "pv", "cascade")

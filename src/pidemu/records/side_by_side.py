@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from pidemu.program.builder import Action
 from pidemu.records.files import Floats, Record
 from pidemu.records.playback import Playback, far_out, play
 from pidemu.records.sampling import Scale, controller_for, sampled
 from pidemu.records.standard import Segment
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 
 Limits = tuple[float, float]

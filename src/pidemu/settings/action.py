@@ -6,12 +6,13 @@ output follows (specs/equations.md, section 1).
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 from pidemu.card.model.card_file import Equation
 from pidemu.errors import SettingError
-from pidemu.program.builder import Action
 from pidemu.settings.settings import Settings
+
+Action = Literal["reverse", "direct"]
 
 ACTIONS: Final[tuple[Action, Action]] = ("reverse", "direct")
 FORMULA: Final[dict[Action, str]] = {"reverse": "SP - PV", "direct": "PV - SP"}

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from pidemu.algorithm.resolve import default_scan
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.model.base import Form
-from pidemu.card.model.card_file import Equation, Setting
+from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, Quantity, number, shown

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from pidemu.algorithm.model import Algorithm, Lag
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.card_file import Equation, Setting
 from pidemu.errors import ScanError
@@ -16,6 +15,7 @@ from pidemu.settings.ranges import PERCENT, SignalRange
 from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
+    from pidemu.algorithm.model import Algorithm
     from pidemu.law.law import Law
 
 
@@ -246,6 +246,7 @@ class Settings(Mapping[str, Value]):
         SettingError
             The settings do not make a controller: no gain to divide by, a filter of zero derivative gain.
         """
+        from pidemu.algorithm.model import Lag
         from pidemu.algorithm.resolve import algorithm_of  # numbers are made from settings, not settings from numbers
 
         equation = self.equation

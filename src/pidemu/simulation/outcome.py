@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from pidemu.analysis.figures import loop_figures
+from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.analysis.open_loop import OpenLoop, low_frequency_sign
-from pidemu.certificate.models import LoopFigures
 from pidemu.errors import PidemuError
 from pidemu.simulation.trial import Trial
 

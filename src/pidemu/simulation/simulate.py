@@ -10,14 +10,14 @@ import numpy.typing as npt
 
 from pidemu.analysis.figures import loop_figures
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
+from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
 from pidemu.backends.choice import Choice, Engine, checked, for_record, safe_runner
 from pidemu.backends.python import starting
-from pidemu.certificate.models import LoopComparison, LoopFigures
 from pidemu.controller.controller import Controller
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
-from pidemu.program.builder import Action
 from pidemu.records.sampling import Scale
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.experiment import integral_of_error
 from pidemu.simulation.trial import Step, Trial, first_scan, trial

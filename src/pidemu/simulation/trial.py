@@ -16,11 +16,11 @@ from pidemu.controller.controller import Controller
 from pidemu.errors import ProcessError
 from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible, shown
 from pidemu.process.process import Process
-from pidemu.program.builder import Action
 from pidemu.program.ir import Program
 from pidemu.program.specialise import specialise
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for, limits_for
+from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.closed import closed_loop
 

@@ -14,6 +14,7 @@ from pidemu.card.model.around import Action, Arithmetic, Faults, Output, Scan, T
 from pidemu.card.model.base import Evidence, Form, Model, Name, Number, SettingName, Size, Source, Text
 from pidemu.card.model.integral import Integral
 from pidemu.card.model.terms import Cascade, Derivative, ErrorShape, Feedforward, Measurement, Proportional, Setpoint
+from pidemu.units import Role, parse_quantity, to_canonical
 
 
 class Setting(Model):
@@ -142,6 +143,17 @@ class Equation(Model):
         "and the output stands, if absent.",
     )
     settings: dict[SettingName, Setting] = Field(min_length=1, max_length=50, description="The dials, by the vendor's own names.")
+
+
+def default_scan(equation: Equation) -> float:
+    """Return the card's scan interval [s]."""
+    number, unit = parse_quantity(equation.scan.default)
+    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
+
+
+def gain_sign(equation: Equation) -> float:
+    """Return -1 where a positive gain is direct acting (`action.fixed` with ``pv - sp``), else 1."""
+    return -1.0 if equation.action.fixed and equation.action.reverse == "pv - sp" else 1.0
 
 
 class CardFile(Equation):
