@@ -21,8 +21,8 @@ class Runner:
     ----------
     run : callable
         ``run(state, signals, scans)``: so many scans. `state` is a list as `pidemu.backends.python.starting` and the program's
-        delay lines (deques) make it, and is changed in place; `signals` holds an array of shape (scans,) per input. Returns an array of
-        shape (recorded names, scans).
+        delay lines (deques) make it, and is changed in place; `signals` holds an array of shape (scans,) per input. Returns an
+        array of shape (recorded names, scans).
     run_automatic : callable
         The same for scans after the first automatic one, with the signals in `read_in_automatic`.
     read_in_automatic : tuple of str

@@ -19,7 +19,7 @@ from pidemu.records.playback import play
 from pidemu.report.plots import check_picture, plot_comparison, plot_run
 from tests.cli.helpers import Said, said
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1")
 RUN = ("run", *PROVOX, "--scan", "1", "--record", str(ROOT / "examples" / "record.csv"), "-o", "out.csv")
 COMPARE = ("compare", *PROVOX, "emerson/deltav", "GAIN=2.7", "RESET=20", "RATE=4")

@@ -18,7 +18,7 @@ from pidemu.errors import EngineError, ScanError
 from pidemu.settings.settings import Settings
 from tests.helpers import Floats, option_combinations, scans_of, settings_of
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 
 def pi(**given: object) -> Settings:
