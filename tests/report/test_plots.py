@@ -113,17 +113,20 @@ def test_a_single_sample_and_outputs_that_are_no_numbers_can_be_drawn(folder: Pa
     assert (folder / "x.png").stat().st_size > 10_000 < (folder / "y.png").stat().st_size
 
 
-HUGE = np.array([1e308, -1e308, 50.0, np.nan, 1.7e308, -1.7e308, 60.0])
+HUGE = np.array([50.0, 1e308, -1e308, np.nan, 1.7e308, -1.7e308, 60.0])
+"""The first sample is where a comparison starts from rest, and has to be a signal."""
 
 
-@pytest.mark.parametrize("values", [HUGE, np.full(7, 1e308), np.array([50.0] * 6 + [-1.7e308])], ids=["mixed", "all", "one"])
+@pytest.mark.parametrize(
+    "values", [HUGE, np.array([50.0] + [1e308] * 6), np.array([50.0] * 6 + [-1.7e308])], ids=["mixed", "all", "one"]
+)
 def test_signals_near_the_largest_number_can_be_drawn(folder: Path, values: Floats) -> None:
     settings = pidemu.load_card("generic/standard").settings(K=2, Ti=50)
-    for record in (Record(values, -values), Record(np.full(7, 50.0), values, cascade=values)):
+    for record in (Record(values, 100 - values), Record(np.full(7, 50.0), values, cascade=values)):
         played = play(Controller(settings, 1.0, initial_output=50.0), record, "r")
         plot_run(folder / "x.png", settings, record, played, (-1e308, 1e308))
         assert (folder / "x.png").stat().st_size > 10_000
-    plot_comparison(folder / "y.png", pidemu.compare([settings, settings], Record(values, -values), initial_output=50.0))
+    plot_comparison(folder / "y.png", pidemu.compare([settings, settings], Record(values, 100 - values), initial_output=50.0))
     assert (folder / "y.png").stat().st_size > 10_000
 
 
