@@ -122,7 +122,8 @@ def test_there_and_back_stays_within_the_two_stated_deviations(data: st.DataObje
     bands = [c.certificate.feedback.loop_band for c in (there, back)]
     low, high = max(b.low for b in bands), min(b.high for b in bands)
     if a.algorithm().ki:
-        assert high / low > 100, "both bands are placed by the same effective integral time"
+        # both bands span 500 to 1 and are placed by the effective integral time, which an approximate conversion moves
+        assert high / low > (100 if max(b.max_deviation for b in bands) < 0.01 else 20)
     assume(high > low)  # without integral action, by a ratio of moments that a conversion need not keep
     bound = math.prod(1 + b.max_deviation for b in bands) - 1
     # the bands' 300 frequencies do not meet the worst one exactly: 2 % of the deviation
