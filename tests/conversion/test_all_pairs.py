@@ -117,7 +117,7 @@ def test_no_conversion_that_costs_more_than_the_source_s_own_numbers_may_is_fart
     own, other = (c.headline.loop_band.max_deviation for c in (conversion.certificate, book))
     # the source's own numbers are kept below 1 % in the loop band, below 2 % where its filter is only assumed
     kept = 0.02 if filter_status(source) is Status.ASSUMED else 0.01
-    # the largest value is found on a grid, to 1e-5; the least deviation is sought in the whole band, of which scans may leave a part
+    # the largest value is found on a grid, to 1e-5; the least deviation is sought in the whole band, of which scans leave a part
     nearly = 1.1 if scan is not None and conversion.match == "constrained" else 1 + 1e-5
     assert own <= max(other * nearly + 1e-9, kept)
 
