@@ -41,3 +41,7 @@ def test_what_a_message_quotes_is_short_and_in_one_line() -> None:
     assert quoted("x" * 60) == "x" * 60
     assert quoted("x" * 5_000_000) == f"{40 * 'x'}…{20 * 'x'}"
     assert quoted(12) == "12"
+
+
+def test_a_delete_character_alone_is_an_escape_of_json() -> None:
+    assert printable_json('"\x7f"') == '"\\u007f"'

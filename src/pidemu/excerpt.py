@@ -101,7 +101,7 @@ def printable_json(text: str) -> str:
     >>> print(printable_json('"FIC-1\x9b2J"'))
     "FIC-1\u009b2J"
     """
-    if text.isascii():
+    if text.isascii() and "\x7f" not in text:
         return text
     return "".join(f"\\u{ord(c):04x}" if is_hidden(c) and c != "\n" and ord(c) < 0x10000 else c for c in text)
 

@@ -77,6 +77,12 @@ def test_the_bias_is_the_output_of_a_controller_without_integral(folder: Path) -
 
 
 @pytest.mark.filterwarnings("error")
+def test_a_recorded_output_whose_square_overflows_is_compared(folder: Path) -> None:
+    _, _, err = recorded(folder, "sp,pv,auto,manual,out\n50,50,0,1,1\n50,50,1,1,1e200\n")
+    assert "largest difference from the recorded output: 1e+200 in sample 1" in err
+
+
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("outputs", "said_of_them"),
     [(("", "1"), "0 in sample 1 (counted from 0): emulated 1, recorded 1"), (("1", "1e20"), "1e+20 in sample 1")],

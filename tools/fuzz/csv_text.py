@@ -99,4 +99,6 @@ def _count(lines: Sequence[str], is_empty: str) -> int:
     held = [line for line in lines if line.strip(is_empty)]
     while held and (held[0].startswith("# ") or held[0].rstrip() == "#"):
         del held[0]
+    if held and re.fullmatch(r"sep=.", held[0].strip()):  # what a spreadsheet writes above the header
+        del held[0]
     return max(0, len(held) - 1)

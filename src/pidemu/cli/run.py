@@ -247,7 +247,10 @@ def _worst(recorded: Floats, emulated: Floats) -> tuple[float, int, float] | Non
     difference = np.where(known, np.abs(emulated - recorded), -np.inf)
     difference[known & ~np.isfinite(emulated)] = np.inf  # no number where one was recorded
     at = int(np.argmax(difference))
-    return float(difference[at]), at, float(np.sqrt(np.mean(difference[known] ** 2)))
+    largest = float(difference[at])
+    if not largest or np.isinf(largest):
+        return largest, at, largest
+    return largest, at, largest * float(np.sqrt(np.mean((difference[known] / largest) ** 2)))  # the squares may overflow
 
 
 def _difference(record: Record, emulated: Floats) -> str:
