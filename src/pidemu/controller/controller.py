@@ -364,7 +364,7 @@ class Controller:
         """
         everyday = self._plain and auto is True and manual is None and interval is None and not hold
         everyday = everyday and type(sp) is float and type(pv) is float
-        usual = everyday and -SIGNAL <= sp <= SIGNAL and -SIGNAL <= pv <= SIGNAL
+        usual = everyday and not self._lost and -SIGNAL <= sp <= SIGNAL and -SIGNAL <= pv <= SIGNAL
         if usual and cascade is track is external_reset is feedforward is None:
             self._last = (sp, pv, 1.0, nan)
             self._count += 1
