@@ -73,6 +73,8 @@ class _Chunks:
         self._loops, self._size = iter(loops), _FIRST
         self._under_way: dict[Any, list[Numbered]] = {}
         self._halves: list[list[Numbered]] = []
+        self._suspects: list[Numbered] = []
+        self._alone: set[int] = set()
         self._workers = _Workers(client, worker_timeout)
 
     def outcomes(self) -> Iterator[Outcome | Failed]:
@@ -83,16 +85,14 @@ class _Chunks:
                 if future.cancelled():
                     break
                 chunk = self._under_way.pop(future)
-                if len(chunk) > 1 and isinstance(future.exception(), self._distributed.KilledWorker):
-                    middle = len(chunk) // 2  # one of them ends whatever runs it: the others are not to go with it
-                    self._halves += [chunk[:middle], chunk[middle:]]
-                else:
-                    found, seconds = _result(future, chunk)
+                taken = _taken(future)
+                if not (isinstance(taken, self._distributed.KilledWorker) and self._is_tried_again(chunk)):
+                    found, seconds = _result(taken, chunk)
                     yield from found
                     self._size = _next_size(self._size, len(chunk), seconds)
                 if self._client.status == "running":
                     done.update(self._submitted())
-            left = itertools.chain(*self._under_way.values(), *self._halves, self._loops)
+            left = itertools.chain(*self._under_way.values(), *self._halves, self._suspects, self._loops)
             yield from (Failed(place, self._workers.fault or _LOST) for place, _ in left)
         finally:
             if self._client.status == "running":
@@ -108,7 +108,27 @@ class _Chunks:
         return new
 
     def _next(self) -> list[Numbered]:
-        return self._halves.pop() if self._halves else list(itertools.islice(self._loops, self._size))
+        if self._halves:
+            return self._halves.pop()
+        chunk = list(itertools.islice(self._loops, self._size))
+        if not chunk and not self._under_way and self._suspects:
+            chunk = [self._suspects.pop()]
+            self._alone.add(chunk[0][0])
+        return chunk
+
+    def _is_tried_again(self, chunk: list[Numbered]) -> bool:
+        """Tell whether loops whose workers were killed get another chance: halves of them, and at the end each with nothing beside.
+
+        One of them may end whatever runs it, and takes with it what the same worker is at; the others are not to fail for it.
+        """
+        middle = len(chunk) // 2
+        if middle:
+            self._halves += [chunk[:middle], chunk[middle:]]
+        elif chunk[0][0] not in self._alone:
+            self._suspects += chunk
+        else:
+            return False
+        return True
 
 
 class _Workers:
@@ -178,13 +198,23 @@ def _light(one: Outcome | Failed) -> Outcome | Failed:
     return replace(one, members=tuple(replace(m, structure=None, values=(), initial=()) for m in one.members))  # type: ignore[arg-type]
 
 
-def _result(future: Any, chunk: Sequence[Numbered]) -> tuple[list[Outcome | Failed], float]:
+Taken = tuple[list[Outcome | Failed], float]
+
+
+def _taken(future: Any) -> Taken | Exception:
+    """Return what a chunk gave, or why there is nothing: its own error, or that of a worker that was lost with what it had done."""
+    try:
+        taken: Taken = future.result()
+    except Exception as error:
+        return error
+    return taken
+
+
+def _result(taken: Taken | Exception, chunk: list[Numbered]) -> Taken:
     """Return what a chunk gave; where it could not be run at all, why, for each of its loops."""
-    error = future.exception()
-    if error is None:
-        found: tuple[list[Outcome | Failed], float] = future.result()
-        return found
-    return [Failed(place, f"the cluster could not run it: {error}") for place, _ in chunk], _SECONDS
+    if isinstance(taken, Exception):
+        return [Failed(place, f"the cluster could not run it: {taken}") for place, _ in chunk], _SECONDS
+    return taken
 
 
 def _next_size(size: int, loops: int, seconds: float) -> int:
