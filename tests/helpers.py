@@ -115,10 +115,10 @@ def settings_of(data: st.DataObject, card: Card) -> Settings:
 @st.composite
 def scans_of(draw: st.DrawFn, algorithm: Algorithm) -> float:
     """A scan interval [s]; with a rule that rings or is unstable where the filter is faster than the scan, one below its time."""
-    rules = (algorithm.derivative_rule, algorithm.filter_rule)
+    rules = (algorithm.derivative.rule, algorithm.filter_rule)
     rings = algorithm.Tf and any(rule in (Rule.FORWARD, Rule.TRAPEZOIDAL) for rule in rules)
     highest = min(10.0, algorithm.Tf) if rings else 10.0
-    if algorithm.precision == "integer":
+    if algorithm.arithmetic.type == "integer":
         return draw(st.integers(1, 100)) / 10
     if algorithm.dahlin is not None:
         return draw(st.floats(max(0.05, algorithm.dahlin.delay / 30), 10))

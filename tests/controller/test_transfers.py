@@ -208,13 +208,13 @@ def terms(a: Algorithm, h: float) -> float:
 def test_a_card_whose_transfer_is_bumpless_does_not_bump(name: str, data: st.DataObject, seed: int) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
     a = chosen.algorithm(own_units=True)
-    if a.start != "bumpless" or not (a.velocity or a.ki):
+    if a.transfer.start != "bumpless" or not (a.velocity or a.ki):
         return
     h = data.draw(scans_of(a))
     ctl = Controller(chosen, h, output_limits=(0, 100), initial_output=50.0)
     history(seed, a).run(ctl)
     # I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest; whole counts; 24 bits
-    allowed = {"float64": 1e-12 * terms(a, h), "float32": 1e-6 * terms(a, h), "integer": 1.0 / a.counts}[a.precision]
+    allowed = {"float64": 1e-12 * terms(a, h), "float32": 1e-6 * terms(a, h), "integer": 1.0 / a.counts}[a.arithmetic.type]
     automatic = ("to automatic", "to cascade")
     entered = [e for e in ctl.events if e.text.endswith(automatic) and not e.text.startswith(("automatic", "cascade"))]
     assert [e for e in entered if abs(e.bump) > allowed] == []
@@ -228,13 +228,13 @@ def test_only_the_difference_of_setpoint_and_measurement_counts_where_p_and_d_ac
 ) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
     a = chosen.algorithm()
-    of_the_error = (a.b == 1 or not a.kp) and (a.c == 1 or not a.kd) and a.cascade_b is None and not a.sp_from_zero
-    if not of_the_error or a.precision != "float64" or (a.shape is not None and a.shape.zero_crossing):
+    of_the_error = (a.b == 1 or not a.kp) and (a.c == 1 or not a.kd) and a.cascade_b is None and a.setpoint.starts != "zero"
+    if not of_the_error or a.arithmetic.type != "float64" or (a.error is not None and a.error.zero_crossing):
         return
     h, x = data.draw(scans_of(a)), history(seed, a)
     one, other = (Controller(chosen, h, output_limits=(-1e9, 1e9), initial_output=50.0) for _ in range(2))
     moved = x.moved(**{s: x.columns[s] + shift for s in ("sp", "pv", "cascade")})
     # the signals have ten binary places, so their difference is exact; behind a filter it is rounded to 1e-16 of itself
-    filtered = a.pv_filter or a.sp_filter or a.e_filter or a.Tf
+    filtered = a.measurement.filter or a.setpoint.filter or a.error.filter or a.Tf
     difference = np.max(np.abs(x.run(one) - moved.run(other)))
     assert difference <= (1e-11 * terms(a, h) if filtered else 0.0)

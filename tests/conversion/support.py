@@ -96,8 +96,8 @@ def settings_that_act(data: st.DataObject, card: Card) -> Settings:
 def rules(settings: Settings) -> list[object]:
     """Rules of the terms that are in use, and the number format."""
     a = settings.algorithm()
-    lags = [lag for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None]
-    used = [a.ki and a.integral_rule, a.kd and a.derivative_rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
+    lags = [lag for lag in (a.setpoint.filter, a.measurement.filter, a.error.filter) if lag is not None]
+    used = [a.ki and a.integral.rule, a.kd and a.derivative.rule, a.Tf and a.filter_rule, *(lag.rule for lag in lags)]
     # a series form multiplies integral and derivative: by two rules that is not what a sum of the two gives
-    mixed = bool(a.ki and a.kd) and a.integral_rule is not a.derivative_rule
-    return [*used, a.precision, a.previous_pv, mixed and a.series]
+    mixed = bool(a.ki and a.kd) and a.integral.rule is not a.derivative.rule
+    return [*used, a.arithmetic.type, a.measurement.previous_scan, mixed and a.series]

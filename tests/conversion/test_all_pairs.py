@@ -81,7 +81,7 @@ def test_a_verdict_is_always_given_and_it_is_what_the_emulations_show(
     if verdict == "approximate" or certificate.scan_by_scan is None or conversion.factor < 0:
         return
     # limits of the integral are limits, which the linear range leaves out; the certificate names them
-    assume(all(s.algorithm().integral_limits is None for s in (source, conversion.settings)))
+    assume(all(s.algorithm().integral.limits is None for s in (source, conversion.settings)))
     h, same = certificate.scan_by_scan.scan, certificate.scan_by_scan
     claimed = same.is_exact if verdict == "exact" else same.is_exact_on_measurement
     alike = math.isclose(*h) and rules(conversion.source) == rules(conversion.settings)
@@ -152,7 +152,7 @@ def test_the_stated_deviation_is_what_the_emulated_controllers_show_on_sines_in_
     band = bands(source.law(), None)[0]
     w = band[0] ** (1 - place) * band[1] ** place
     h = 2 * math.pi / (w * PER_PERIOD)
-    assume(max(a.Tf, *(lag.at(h) for lag in (a.pv_filter, a.e_filter) if lag is not None), 0.0) < 2 * PER_PERIOD * h)
+    assume(max(a.Tf, *(lag.at(h) for lag in (a.measurement.filter, a.error.filter) if lag is not None), 0.0) < 2 * PER_PERIOD * h)
     try:
         conversion = convert(source, target, scan=h, emulate=False)
         found = conversion.settings.algorithm()

@@ -64,7 +64,7 @@ def memory(s: Settings, h: float) -> int:
         "forward": 1 - h / a.Tf if a.Tf else 0.0,
         "trapezoidal": (2 * a.Tf - h) / (2 * a.Tf + h) if a.Tf else 0.0,
         "lagged-difference": math.exp(-h / a.Tf) if a.Tf else 0.0,
-    }[a.derivative_rule.value]
+    }[a.derivative.rule.value]
     return 10 + math.ceil(30 / -math.log(abs(pole))) if pole else 10
 
 

@@ -39,9 +39,9 @@ def run(s: Settings, pv: Floats, h: float, sp: Floats | None = None, limits: tup
 def rules(s: Settings) -> tuple[object, ...]:
     """Scan rules of the terms at work."""
     a = s.algorithm()
-    lags = [x.rule for x in (a.sp_filter, a.pv_filter, a.e_filter) if x is not None]
-    terms = (a.integral_rule if a.ki else None, (a.derivative_rule, a.filter_rule) if a.kd else None)
-    return (*terms, a.filter_rule if a.Tf and a.filter_on != "term" else None, a.previous_pv, a.precision, *lags)
+    lags = [x.rule for x in (a.setpoint.filter, a.measurement.filter, a.error.filter) if x is not None]
+    terms = (a.integral.rule if a.ki else None, (a.derivative.rule, a.filter_rule) if a.kd else None)
+    return (*terms, a.filter_rule if a.Tf and a.filter_on != "term" else None, a.measurement.previous_scan, a.arithmetic.type, *lags)
 
 
 @given(data=st.data())
@@ -51,7 +51,7 @@ def test_where_exact_is_said_and_the_scan_rules_are_the_same_the_outputs_are_the
     h = data.draw(scans_of(source.algorithm()))
     found = converted(source, target, scan=h, emulate=True)
     assume(found.verdict == "exact" and found.factor > 0 and rules(found.source) == rules(found.settings))
-    assume(all(s.algorithm().integral_limits is None for s in (source, found.settings)))
+    assume(all(s.algorithm().integral.limits is None for s in (source, found.settings)))
     pv, sp = random_signal(data.draw(st.integers(0, 99)), 100), random_signal(data.draw(st.integers(0, 99)), 100)
     a, b = (run(s, pv, h, sp) for s in (source, found.settings))
     if not source.algorithm().ki:
@@ -83,7 +83,7 @@ NO_BIAS = "epics/epid"
 def left_by_a_limit(s: Settings) -> float:
     """How far an excursion to a limit leaves the output from where it was, though the error is what it was."""
     a = s.algorithm()
-    own = a.velocity or a.start == "load-output" or a.bias  # it counts from its last output, or holds what its output was
+    own = a.velocity or a.transfer.start == "load-output" or a.bias  # it counts from its last output, or holds what its output was
     controller = pidemu.Controller(s, 1.0, output_limits=(0.0, 100.0), bias=0.0 if own else START, initial_output=START)
     controller.rest(START, START, START)
     return abs(float(controller.run(np.full_like(MOVE, START), START - MOVE / a.kp)[-1]) - START)

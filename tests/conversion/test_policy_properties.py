@@ -29,7 +29,7 @@ def p_sees_setpoint(a: Algorithm, mode: str) -> bool:
 
 def spikes(a: Algorithm) -> bool:
     """Whether a setpoint step goes through a derivative without any filter."""
-    return bool(a.kd and a.c and not (a.Tf or a.pv_filter or a.e_filter or a.sp_filter))
+    return bool(a.kd and a.c and not (a.Tf or a.measurement.filter or a.error.filter or a.setpoint.filter))
 
 
 @given(

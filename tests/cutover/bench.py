@@ -100,7 +100,7 @@ def followed(plan: TransferPlan, s: Settings, scans: int = 3, output_limits: tup
     ctl = Controller(s, output_limits=output_limits, bias=given.get("bias", 0.0), initial_output=OP)
     ctl.scan(20.0, PV, auto=False, manual=given.get("manual entry", OP))  # the setpoint was another one before
     u = ctl.run(sp, [PV] * wait(plan), auto=False, manual=given.get("manual entry", OP))[-1]
-    if a.manual_output != "zero":
+    if a.transfer.manual_output != "zero":
         assert u == pytest.approx(OP, rel=1e-6, abs=0.01)  # nothing moves the valve in manual: 24 bits, whole counts
     if "load" in given or "I" in given:
         states = ctl.state
@@ -115,10 +115,10 @@ def followed(plan: TransferPlan, s: Settings, scans: int = 3, output_limits: tup
 def increment(s: Settings, e: float) -> float:
     """What the integral adds per scan, ``ki h S(e)`` (specs/equations.md, sections 4 and 8)."""
     a, size = s.algorithm(), abs(e)
-    if a.shape is not None and a.shape.on_integral:
-        gap = a.shape.gain if size <= a.shape.band else 1.0
-        e *= {"gap": gap, "squared": size / 100, "gain-linear": a.shape.linearity + (1 - a.shape.linearity) * size / 100}[
-            a.shape.kind
+    if a.error is not None and a.error.on_integral:
+        gap = a.error.gain if size <= a.error.band else 1.0
+        e *= {"gap": gap, "squared": size / 100, "gain-linear": a.error.linearity + (1 - a.error.linearity) * size / 100}[
+            a.error.kind
         ]
     return a.ki * Controller(s).interval * e
 

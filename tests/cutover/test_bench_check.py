@@ -46,13 +46,13 @@ def test_jump_and_ramp_are_those_worked_out_by_hand(
 def test_the_emulated_step_is_the_law_s_first_two_moments(name: str) -> None:
     for s in defined(pidemu.load_card(name)):
         a = s.algorithm()
-        if a.shape is not None or a.integral_deadband or a.output_deadband or a.precision == "integer":
+        if a.error is not None or a.integral.deadband or a.output.deadband or a.arithmetic.type == "integer":
             continue  # gap, error squared and deadbands are not linear; whole counts
         h = 0.05 if name != "modelica/limpid" else 0.01
         check = bench_check(s, h, "reverse")
         m0, m1, _ = s.law().moments()
         # what a scan more or less of integration is, and the rounding of 24 bits in signals of 50 and terms of some hundred
-        rounding = 1e-9 if a.precision == "float64" else 2e-3
+        rounding = 1e-9 if a.arithmetic.type == "float64" else 2e-3
         assert check.ramp_per_minute == pytest.approx(-60 * m0 * check.step, rel=1e-6, abs=60 * rounding), s.summary
         assert check.jump == pytest.approx(-m1 * check.step, rel=1e-6, abs=abs(m0) * h * check.step + rounding), s.summary
         most = 0.3 * 255 if name == "arduino/pid" else 30  # its output is 0 to 255

@@ -12,10 +12,10 @@ from tests.cutover.bench import OP, PV, SP, WIDE, E, defined, followed, incremen
 def test_following_the_plan_moves_the_output_by_one_increment_of_the_integral_at_most(name: str) -> None:
     for s in defined(pidemu.load_card(name)):
         plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE, action="reverse")
-        precision = s.algorithm().precision
+        precision = s.algorithm().arithmetic.type
         # rounding of 24 bits in signals of 50 and terms of a few hundred; one count of the output
         assert plan.resolution <= {"float64": 1e-9, "float32": 1e-3, "integer": 0.011}[precision], s.summary
-        bare = not s.algorithm().ki and not s.algorithm().keeps_integral
+        bare = not s.algorithm().ki and s.algorithm().transfer.without_integral != "kept"
         assert plan.is_bumpless or bare, s.summary
         if not plan.is_bumpless:
             continue
@@ -42,10 +42,10 @@ def test_without_the_plan_the_output_moves_as_a_plain_switch_to_automatic_shows(
     for s in defined(pidemu.load_card(name)):
         plan = transfer_plan(s, SP, PV, OP, output_limits=WIDE, action="reverse")
         ctl = Controller(s, output_limits=WIDE, initial_output=OP)
-        if s.algorithm().start != "running":
+        if s.algorithm().transfer.start != "running":
             ctl.run(SP, [PV] * 400, auto=False, manual=OP)
         moved = ctl.scan(SP, PV) - OP
         # the integral's own increment is in the scan or not, as the card has it
-        error = E if not s.algorithm().sp_tracks else 0.0
+        error = E if not s.algorithm().setpoint.tracks else 0.0
         shares = [0.0, 0.5, 1.0]
         assert min(abs(moved - plan.without_plan - x * increment(s, error)) for x in shares) <= plan.resolution + 1e-9, s.summary

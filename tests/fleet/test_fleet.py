@@ -47,7 +47,7 @@ def test_a_mixed_fleet_has_the_numbers_of_its_loops_alone_in_every_engine(engine
 
 def test_a_mixed_fleet_has_all_kinds_of_arithmetic_and_moves() -> None:
     for loops in (mixed(), few()):
-        assert {loop.settings.algorithm().precision for loop in loops} == {"float64", "float32", "integer"}
+        assert {loop.settings.algorithm().arithmetic.type for loop in loops} == {"float64", "float32", "integer"}
     columns = Fleet(mixed()).simulate(**STEPS).columns
     assert np.median(columns["travel"]) > 10
     assert (columns["at_low"] > 0).any()

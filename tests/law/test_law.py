@@ -326,8 +326,8 @@ def z_drawn(a: Algorithm, h: float) -> tuple[Block, Block]:
     """Feedback and setpoint path of an algorithm from its difference equations."""
     one = control.TransferFunction([1], [1], h)
     P = one * a.kp
-    I = z_integral(a.integral_rule, a.ki, h)  # noqa: E741 (the field's symbol)
-    D = z_derivative(a.derivative_rule, a.kd, a.Tf if a.filter_on == "term" else 0.0, h)
+    I = z_integral(a.integral.rule, a.ki, h)  # noqa: E741 (the field's symbol)
+    D = z_derivative(a.derivative.rule, a.kd, a.Tf if a.filter_on == "term" else 0.0, h)
     into = one + D * (1 / a.kp) if a.series and a.kd else one  # what the integral sees of the measurement
     feedback = P + I * into + D
     setpoint = P * a.b + I * (one + D * (a.c / a.kp) if a.series and a.kd else one) + D * a.c
@@ -395,7 +395,7 @@ def test_the_discrete_law_of_every_card_tends_to_its_continuous_law(name: str, d
     assume(not a.Tf or a.Tf > h)  # the forward rule is unstable otherwise
     cross = abs(a.ki * a.derivative_per_gain) if a.series else 0.0
     scale = abs(a.kp) + abs(a.ki) / w + abs(a.kd) * w + cross
-    if a.derivative_rule is Rule.LAGGED_DIFFERENCE and a.kd:
+    if a.derivative.rule is Rule.LAGGED_DIFFERENCE and a.kd:
         scale = scale + 1e4 * abs(a.kd) * w * h / a.Tf  # this rule's derivative is short by h/Tf of itself
     for path in PATHS:
         difference = np.abs(Law(a).response(w, path) - given_settings.law(scan=h).response(w, path))

@@ -86,11 +86,11 @@ class Parts:
 
 def parts(a: Algorithm, h: float, sp: Floats, pv: Floats) -> Parts:
     """Previous-scan measurement, then the filters, then the terms; the filtered error goes with P and D on error."""
-    y = np.concatenate([pv[:1], pv[:-1]]) if a.previous_pv else pv
-    y, r = lagged(y, a.pv_filter, h), lagged(sp, a.sp_filter, h)
-    e = lagged(r - y, a.e_filter, h)
-    filtered = a.e_filter is not None
-    D = derivative(e if filtered else a.c * r - y, a.kd, a.Tf, h, a.derivative_rule)
+    y = np.concatenate([pv[:1], pv[:-1]]) if a.measurement.previous_scan else pv
+    y, r = lagged(y, a.measurement.filter, h), lagged(sp, a.setpoint.filter, h)
+    e = lagged(r - y, a.error.filter, h)
+    filtered = a.error.filter is not None
+    D = derivative(e if filtered else a.c * r - y, a.kd, a.Tf, h, a.derivative.rule)
     P = a.kp * (e if filtered else a.b * r - y)
     return Parts(P, D, e + D / a.kp if a.series else e)
 

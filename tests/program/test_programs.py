@@ -265,7 +265,7 @@ def assert_bumpless(a: Algorithm, h: float, seed: int) -> None:
     x = record(seed, modes=True)
     u = run(build(a, h, limits=(0.0, 100.0), initial_output=30.0), x)
     scale = (
-        largest_term(a, h, x) + 1e12 * (a.precision == "integer") / a.counts
+        largest_term(a, h, x) + 1e12 * (a.arithmetic.type == "integer") / a.counts
     )  # whole counts; I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest
     for n in starts_in_automatic(x):
         assert abs(u[n] - u[n - 1]) <= 1e-12 * scale
@@ -278,14 +278,14 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
 ) -> None:
     a = settings_of(data, pidemu.load_card(name)).algorithm(own_units=True)
     h = data.draw(scans_of(a))
-    if a.start == "load-output" or (a.ki == 0 and not a.velocity and a.dahlin is None):  # bumped by P + D, as in the field
+    if a.transfer.start == "load-output" or (a.ki == 0 and not a.velocity and a.dahlin is None):  # bumped by P + D, as in the field
         x = record(seed, modes=True)
         a = replace(
             a.linear, kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_integral=True, holds="ki e", manual_output="operator"
         )
         u = run(build(a, h, initial_output=30.0), x)
         assert all(u[n] == u[n - 1] for n in starts_in_automatic(x))
-    elif a.start == "bumpless":
+    elif a.transfer.start == "bumpless":
         assert_bumpless(a, h, seed)
 
 
@@ -334,7 +334,7 @@ def test_reverse_acting_means_that_the_output_falls_when_the_measurement_rises(n
     a = settings_of(data, pidemu.load_card(name)).algorithm()
     a = replace(a.linear, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd))  # a negative gain turns the action round
     first = impulse(build(a, data.draw(scans_of(a)), limits=WIDE), "feedback", 1)[0]
-    late = a.integral_rule is Rule.FORWARD or a.ki == 0.0
+    late = a.integral.rule is Rule.FORWARD or a.ki == 0.0
     assert first > 0 or (a.kp == a.kd == 0.0 and late and first == 0)
 
 

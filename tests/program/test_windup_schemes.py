@@ -280,7 +280,7 @@ def test_deltavs_nonlinear_gain_is_a_gap_of_p_and_i_and_its_filters_are_off_unle
     given = card.settings(GAIN=2, RESET=60, NL_GAP=3, NL_MINMOD=0.25, PV_FTIME=2, SP_FTIME=4)
     assert given.options["FRSIPID_OPTS"] == "nonlinear gain"
     a = given.algorithm()
-    assert (a.shape, a.pv_filter, a.sp_filter) == (Shape(kind="gap", band=3.0, gain=0.25), Lag(2.0), Lag(4.0))
+    assert (a.error, a.measurement.filter, a.setpoint.filter) == (Shape(kind="gap", band=3.0, gain=0.25), Lag(2.0), Lag(4.0))
 
 
 # --- external reset where P does not see the whole error ---------------------------------------------------------------
@@ -373,7 +373,7 @@ def _ends(settings: pidemu.Settings, error: float) -> float:
     controller = pidemu.Controller(settings, output_limits=(0.0, 100.0), initial_output=50.0)
     scans = 400 if a.dahlin is not None else math.ceil(100.0 / abs(a.ki * controller.interval * error)) + 100
     scans = max(scans, 500)  # a setpoint with a rate limit starts at zero
-    scans *= 20 if a.shape is not None and a.shape.kind == "squared" else 2  # 7 % of the error count then
+    scans *= 20 if a.error is not None and a.error.kind == "squared" else 2  # 7 % of the error count then
     controller.run(50.0, [50.0] * 3)
     return float(controller.run(50.0 + error, [50.0] * scans)[-1])
 
@@ -420,7 +420,7 @@ def test_away_from_the_limits_every_scheme_integrates_the_error(name: str, pid: 
     e, D = sp - pv, -a.kd * np.diff(pv, prepend=pv[0]) / H
     inner = a.kp * e + I
     free = (u > LOW) & (u < HIGH) & (np.abs(a.kp * e) <= HIGH - LOW) & (inner > LOW) & (inner < HIGH)
-    free &= (I > LOW) & (I < 30) if a.integral_limits else (I > LOW) & (I < HIGH) if "clamp" in name else True
+    free &= (I > LOW) & (I < 30) if a.integral.limits else (I > LOW) & (I < HIGH) if "clamp" in name else True
     ahead = I[:-1] + (a.kp * e + a.ki * H * e + D)[1:]  # what conditional looks at
     both = free[1:] & free[:-1] & (ahead > LOW) & (ahead < HIGH)
     scale = 1 + np.max(np.abs(I)) + np.max(np.abs(a.kp * e)) + np.max(np.abs(D))

@@ -201,7 +201,7 @@ def test_the_process_of_a_float32_controller_is_computed_in_float64(card_id: str
 
 def test_an_integer_controller_moves_by_whole_counts() -> None:
     settings = wanting("toshiba/pid3")
-    assert settings.algorithm().precision == "integer"
+    assert settings.algorithm().arithmetic.type == "integer"
     out, _ = check(settings, PROCESSES["first order"])
     steps = np.unique(np.diff(out))
     assert steps.size > 1

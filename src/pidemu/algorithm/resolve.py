@@ -1,35 +1,81 @@
-"""A card's settings to an `Algorithm`: the numbers of its terms, filters, windup and stages in canonical units."""
+"""A card and its settings to an `Algorithm`: one walk over the card's tree that puts numbers where it names settings."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, Generic
 
-from pidemu.algorithm.model import Algorithm, Dahlin, Gate, Lag, Place, Shape
-from pidemu.card.model.base import Form, Rule
-from pidemu.card.model.card_file import Equation, default_scan, gain_sign
-from pidemu.card.model.integral import (
-    FastReturn,
-    IntegralLimits,
-    WindupBackCalculation,
-    WindupExternalReset,
-    WindupGate,
-    WindupRecompute,
-)
-from pidemu.card.model.terms import ErrorShape, Filter, Measurement, Setpoint
+from pidemu.algorithm.model import Algorithm, Dahlin
+from pidemu.card.model.base import Form, Reference, Rule
+from pidemu.card.model.card_file import Equation, default_scan
+from pidemu.card.model.integral import Integral, IntegralLimits
+from pidemu.card.model.operation import Arithmetic, Output
+from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint, SignalFilter
+from pidemu.card.model.terms import Derivative, Feedforward, Filter, Proportional
 from pidemu.errors import SettingError, UndefinedError
+from pidemu.numeric import X
 from pidemu.settings.settings import Settings
 from pidemu.units import Dimension, Role, Spans, parse_unit, to_canonical
 
 
-@dataclass(frozen=True, slots=True)
-class Reader:
-    """Reads a card's dials and numbers in canonical units, or in the controller's own."""
+@dataclass(frozen=True)
+class Reader(Generic[X]):
+    """Reads a card's dials and numbers in canonical units, or in the controller's own.
+
+    Attributes
+    ----------
+    settings : Settings
+        The settings.
+    spans : Spans
+        Signal spans and scan interval that canonical numbers refer to.
+    own : bool
+        Whether gains and levels stay in the controller's own units.
+    """
 
     settings: Settings
     spans: Spans
     own: bool = False
+
+    def value(self, name: str) -> X:
+        """Return a dial's canonical value; 0 where it is off."""
+        raise NotImplementedError
+
+    def number(self, x: float) -> X:
+        """Return a constant of the card."""
+        raise NotImplementedError
+
+    @property
+    def span_ratio(self) -> X:
+        """Percent gain that one output unit per measurement unit amounts to [%/%]."""
+        raise NotImplementedError
+
+    def role(self, role: Role, default: float) -> Any:
+        """Return the canonical value of the dial that sets `role`."""
+        value = self.settings.by_role(role)
+        return default if value is None else self.value(value.name)
+
+    def pick(self, given: str | float | None, default: float) -> Any:
+        """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
+        if isinstance(given, str):
+            return default if self.settings[given].off else self.value(given)
+        return default if given is None else self.number(given)
+
+    def level(self, given: Reference, default: float) -> Any:
+        """Return a level of the output [%]: a level in engineering units counts from the low end of the range."""
+        level, low = self.pick(given, default), self.settings.op_range.low if self.settings.op_range is not None else 0.0
+        in_units = isinstance(given, str) and parse_unit(self.settings[given].unit).dimension is Dimension.PV_UNITS
+        return level - 100 * low / self.spans.op if in_units and self.settings.equation.signals == "percent" else level
+
+    def level_of_output(self, given: str | float | None) -> Any:
+        """Return a deadband of the output, which a dial for one of the measurement may hold too; 0 where there is none."""
+        return replace(self, spans=replace(self.spans, pv=self.spans.op)).pick(given, 0.0)
+
+
+class FloatReader(Reader[float]):
+    """Reads numbers as floats."""
 
     def value(self, name: str) -> float:
         """Return a dial's canonical value; 0 where it is off."""
@@ -43,10 +89,6 @@ class Reader:
             return replace(self.spans, pv=span, op=span)
         return self.spans
 
-    def level_of_output(self, given: str | float | None) -> float:
-        """Return a deadband of the output, which a dial for one of the measurement may hold too; 0 where there is none."""
-        return replace(self, spans=replace(self.spans, pv=self.spans.op)).pick(given, 0.0)
-
     def number(self, x: float) -> float:
         """Return a constant of the card."""
         return x
@@ -56,130 +98,176 @@ class Reader:
         """Percent gain that one output unit per measurement unit amounts to [%/%]."""
         return float(self.spans.ratio)
 
-    def role(self, role: Role, default: float) -> float:
-        """Return the canonical value of the dial that sets `role`."""
-        value = self.settings.by_role(role)
-        return default if value is None else self.value(value.name)
 
-    def pick(self, given: str | float | None, default: float) -> float:
-        """Return a number that a card gives itself, or by the name of a setting; `default` where there is none or it is off."""
-        if isinstance(given, str):
-            return default if self.settings[given].off else self.value(given)
-        return default if given is None else self.number(given)
+@dataclass(frozen=True)
+class _Core(Generic[X]):
+    """The canonical numbers of the terms, and what else is made of the same dials.
+
+    Attributes
+    ----------
+    read : Reader
+        What they are read from.
+    kp, ki, kd, Tf : number
+        Gains [%/%, 1/s, s] and filter time [s].
+    rate, time : number
+        The dials of integral [1/s] and derivative [s] as they stand.
+    """
+
+    read: Reader[X]
+    kp: Any
+    ki: Any
+    kd: Any
+    Tf: Any
+    rate: Any
+    time: Any
+
+    @property
+    def integrates(self) -> bool:
+        """Whether there is integral action."""
+        return bool(self.ki)
+
+    @property
+    def Ti(self) -> Any:
+        """Integral time [s], of the dial where that is one; 0 without integral action."""
+        if not self.ki:
+            return 0.0
+        parallel = self.read.settings.equation.form is Form.PARALLEL
+        return abs(self.kp / self.ki if parallel and self.kp else 1 / self.rate)
+
+    @cached_property
+    def times(self) -> Mapping[str, Any]:
+        """Times that a card names by a word [s] (specs/equations.md, section 5)."""
+        both = abs(self.kd / self.ki) if self.read.settings.equation.form is Form.PARALLEL else abs(self.Ti * self.time)  # Ti Td
+        return {"Ti": self.Ti, "sqrt(Ti Td)": math.sqrt(both) if both else self.Ti}
+
+    def pick(self, given: str | float | None, default: float) -> Any:
+        """Return a number that a card gives itself, or by the name of a setting."""
+        return self.read.pick(given, default)
+
+    def level(self, given: Reference, default: float) -> Any:
+        """Return a level of the output [%]."""
+        return self.read.level(given, default)
 
 
 def algorithm_of(settings: Settings, *, own_units: bool = False, scan: float | None = None) -> Algorithm:
     """Return the algorithm with its numbers; see `Settings.algorithm`."""
     own = own_units and settings.equation.signals == "engineering"
     interval = default_scan(settings.equation) if scan is None else scan
-    return algorithm_as_read(Reader(settings, replace(Spans() if own else settings.spans, scan=interval), own), interval)
+    return algorithm_as_read(FloatReader(settings, replace(Spans() if own else settings.spans, scan=interval), own), interval)
 
 
-def algorithm_as_read(read: Reader, scan: float | None = None) -> Algorithm:
-    """Return the algorithm with its numbers as a reader reads them: floats, or without rounding."""
-    settings = read.settings
-    equation = settings.equation
-    engineering = equation.signals == "engineering"
-    form = equation.form
-    gain = gain_sign(equation) * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
+def algorithm_as_read(read: Reader[X], scan: float | None = None) -> Algorithm[X]:
+    """Return the algorithm with its numbers as a reader reads them.
+
+    Parameters
+    ----------
+    read : Reader
+        Gives floats, or numbers without rounding.
+    scan : float, optional
+        Scan interval [s]; by default the card's own.
+
+    Raises
+    ------
+    SettingError
+        A setting has a value that nothing can be computed with.
+    UndefinedError
+        The combination is not defined.
+    """
+    equation = read.settings.equation
+    h = default_scan(equation) if scan is None else scan
+    core = _core(read, equation)
+    b = _weight(read, equation.proportional)
+    in_cascade = equation.proportional if equation.cascade is None else equation.cascade.proportional
+    cascade_b = _weight(read, in_cascade)
+    error = _error(read, equation.error, h)
+    return Algorithm(
+        form=equation.form,
+        implementation=equation.implementation,
+        kp=core.kp,
+        ki=core.ki,
+        kd=core.kd,
+        b=b,
+        c=_weight(read, equation.derivative),
+        cascade_b=None if cascade_b == b else cascade_b,
+        Tf=core.Tf,
+        Ti=core.Ti,
+        bias=read.role(Role.BIAS, 0.0),
+        error=error,
+        proportional=Proportional(on=equation.proportional.on, accumulated=equation.proportional.accumulated),
+        integral=_integral(core, equation.integral),
+        derivative=_derivative(equation.derivative),
+        setpoint=_setpoint(read, equation.setpoint, h),
+        measurement=_measurement(read, equation.measurement, h),
+        feedforward=_feedforward(read, equation.feedforward),
+        transfer=equation.transfer,
+        action=equation.action,
+        output=_output(read, equation.output),
+        arithmetic=equation.arithmetic or Arithmetic(type="float64"),
+        shaped_in_cascade=error.on != "integral" and in_cascade.on != "pv",
+        dahlin=_dahlin(read) if equation.form is Form.DAHLIN else None,
+    )
+
+
+def _core(read: Reader[X], equation: Equation) -> _Core[X]:
+    """Return gains and filter time (specs/equations.md, sections 1 and 2)."""
+    form, sign = equation.form, equation.action.gain_sign
+    gain = sign * read.role(Role.GAIN, 0.0 if form is Form.PARALLEL else 1.0)
     scale = read.role(Role.MULTIPLIER, 1.0)
     rate = read.role(Role.INTEGRAL, 0.0) if equation.integral.on != "none" else 0.0
     time = read.role(Role.DERIVATIVE, 0.0) if equation.derivative.on != "none" else 0.0
+    kp = gain * scale
     if form is Form.PARALLEL:
-        kp = gain * scale
-        scale *= read.span_ratio if engineering else 1.0
-        scale *= gain_sign(equation)
+        scale *= read.span_ratio if equation.signals == "engineering" else 1.0
+        scale *= sign
         ki, kd = rate * scale, time * scale
     else:
-        kp = gain * scale
         ki, kd = kp * rate, kp * time
-    filt = equation.derivative.filter
-    if filt is not None and equation.derivative.on == "none" and filt.applies_to in ("term", "lead-lag"):
-        filt = None  # it filters what is not there
-    Tf, place, order = _filter(read, filt, rate, time, kp, kd)
+    filt = _at_work(equation.derivative)
+    Tf = 0.0 if filt is None else _filter_time(read, filt, _Core(read, kp, ki, kd, 0.0, rate, time))
     if filt is not None and filt.applies_to == "lead-lag":
         kd -= kp * Tf
     if equation.derivative.rule is Rule.LAGGED_DIFFERENCE and not Tf:
         kd = 0.0  # there is no lag to take the difference from
     if equation.proportional.on == "none":
         kp = 0.0
-    _refuse_undefined(settings, kp, kd)
-    return Algorithm(
-        series=form is Form.SERIES,
-        kp=kp,
-        ki=ki,
-        kd=kd,
-        b=_weight(read, equation.proportional.on, equation.proportional.weight),
-        c=_weight(read, equation.derivative.on, equation.derivative.weight),
-        Tf=Tf,
-        filter_on=place,
-        filter_order=order,
-        velocity=equation.implementation == "velocity",
-        integral_rule=equation.integral.rule,
-        derivative_rule=equation.derivative.rule,
-        filter_rule=(equation.derivative.filter and equation.derivative.filter.rule) or equation.derivative.rule,
-        windup=equation.integral.windup.scheme,
-        gate=_gate(read, equation),
-        tracking_time=_tracking(read, rate, time, kp, ki, kd) if ki else 0.0,
-        implicit_tracking=getattr(equation.integral.windup, "implicit", False),
-        limits_without_integral=getattr(equation.integral.windup, "without_integral", "zero") == "limited",
-        reads_back=getattr(equation.integral.windup, "reads_back", False),
-        accumulated=equation.proportional.accumulated,
-        gain_sign=gain_sign(equation),
-        holds=equation.integral.holds if kp else "ki e",
-        integral_limits=_integral_limits(read, equation.integral.limits),
-        integral_deadband=_some(read.pick(equation.integral.deadband, 0.0)) if equation.integral.deadband is not None else None,
-        bias=read.role(Role.BIAS, 0.0),
-        dahlin=_dahlin(read) if form is Form.DAHLIN else None,
-        **_transfer(equation),
-        **_signals(read, equation, default_scan(equation) if scan is None else scan),
-        **_output(read, equation),
-    )
-
-
-def _refuse_undefined(settings: Settings, kp: float, kd: float) -> None:
-    equation = settings.equation
-    if equation.form is Form.SERIES and kd and not kp:
+    if form is Form.SERIES and kd and not kp:
         raise UndefinedError(
-            f"{settings.card.id}: a series form with derivative but without proportional action is not defined; "
-            f"change {settings.variant.choice_text}"
+            f"{read.settings.card.id}: a series form with derivative but without proportional action is not defined; "
+            f"change {read.settings.variant.choice_text}"
         )
+    return _Core(read, kp, ki, kd, Tf, rate, time)
 
 
-def _some(value: float) -> float | None:
-    return value if value else None
+def _at_work(derivative: Derivative[Reference]) -> Filter[Reference] | None:
+    """Return the filter that goes with the derivative, unless it filters what is not there."""
+    filt = derivative.filter
+    return None if filt is not None and derivative.on == "none" and filt.applies_to in ("term", "lead-lag") else filt
 
 
-def _weight(read: Reader, on: str, weight: str | float | None) -> float:
-    if on != "weighted":
-        return float(on == "error")
-    return read.value(weight) if isinstance(weight, str) else 1.0 if weight is None else read.number(weight)
+def _weight(read: Reader[X], term: Proportional[Reference] | Derivative[Reference]) -> Any:
+    if term.on != "weighted":
+        return float(term.on == "error")
+    return read.value(term.weight) if isinstance(term.weight, str) else 1.0 if term.weight is None else read.number(term.weight)
 
 
-def _filter(read: Reader, filt: Filter | None, rate: float, time: float, kp: float, kd: float) -> tuple[float, Place, Any]:
-    """Return the filter's time [s], place and order (specs/equations.md, section 1)."""
-    if filt is None:
-        return 0.0, "term", 1
-    place: Place = "term" if filt.applies_to == "lead-lag" else filt.applies_to
+def _filter_time(read: Reader[X], filt: Filter[Reference], core: _Core[X]) -> Any:
+    """Return the time of the filter that goes with the derivative [s] (specs/equations.md, section 1)."""
     if filt.time is not None:
-        return read.pick(filt.time, 0.0), place, filt.order
-    base = _filter_base(read, filt, rate, time, kp, kd)
-    if base == 0:
-        return 0.0, place, filt.order
-    if isinstance(filt.gain, str) and read.settings[filt.gain].off:
-        return 0.0, place, filt.order
-    if filt.gain is not None:
-        gain = read.pick(filt.gain, math.inf)
-        if gain == 0:
-            raise SettingError(
-                f"{read.settings.card.id}: {filt.gain} is 0: a derivative gain of zero means no derivative; "
-                "set the derivative to zero"
-            )
-        return base / gain, place, filt.order
-    return base * read.pick(filt.ratio, 0.0), place, filt.order
+        return read.pick(filt.time, 0.0)
+    base = _filter_base(filt, core)
+    if base == 0 or (isinstance(filt.gain, str) and read.settings[filt.gain].off):
+        return 0.0
+    if filt.gain is None:
+        return base * read.pick(filt.ratio, 0.0)
+    gain = read.pick(filt.gain, math.inf)
+    if gain == 0:
+        raise SettingError(
+            f"{read.settings.card.id}: {filt.gain} is 0: a derivative gain of zero means no derivative; set the derivative to zero"
+        )
+    return base / gain
 
 
-def _filter_base(read: Reader, filt: Filter, rate: float, time: float, kp: float, kd: float) -> float:
+def _filter_base(filt: Filter[Reference], core: _Core[X]) -> Any:
     """Return the derivative time that the filter's ratio or gain refers to [s].
 
     Raises
@@ -187,174 +275,120 @@ def _filter_base(read: Reader, filt: Filter, rate: float, time: float, kp: float
     UndefinedError
         It is ``kd/kp``, of a controller without proportional gain or with one of the other sign.
     """
+    settings, kp, kd = core.read.settings, core.kp, core.kd
     if filt.of == "effective-derivative":
-        return time / (1 + rate * time)
-    if filt.of == "derivative" or not kd or read.settings.equation.form is not Form.PARALLEL:
-        return time
+        return core.time / (1 + core.rate * core.time)
+    if filt.of == "derivative" or not kd or settings.equation.form is not Form.PARALLEL:
+        return core.time
     if not kp or kd / kp <= 0:
         raise UndefinedError(
-            f"{read.settings.card.id}: the derivative's filter goes with the derivative time kd/kp, and kp is {kp:g} with kd "
+            f"{settings.card.id}: the derivative's filter goes with the derivative time kd/kp, and kp is {kp:g} with kd "
             f"{kd:g}; give a proportional gain of the same sign, or switch the filter off"
         )
     return kd / kp
 
 
-def _gate(read: Reader, equation: Equation) -> Gate:
-    match equation.integral.windup:
-        case WindupGate() as w:
-            return Gate(
-                without_derivative=w.judged_on == "sum-without-derivative",
-                this_scan=w.judged_on == "sum",
-                both=w.direction == "both",
-                unless_smaller=w.direction == "unless-smaller",
-                from_integrated=w.resumes_from == "last-integrated",
-                by_output_sign=w.test == "error-times-output",
-                drops=w.last_increment == "dropped",
-            )
-        case WindupRecompute() as w:
-            return Gate(without_derivative=w.without_derivative, clamped=w.clamped)
-        case WindupExternalReset(fast_return=FastReturn() as f):
-            beyond = _level(read, f.low, -math.inf), _level(read, f.high, math.inf)
-            return Gate(fast_return=f.factor, fast_beyond=beyond) if beyond != (-math.inf, math.inf) else Gate()
-    return Gate()
+def _integral(core: _Core[X], i: Integral[Reference]) -> Integral[X]:
+    return Integral(
+        on=i.on,
+        rule=i.rule,
+        holds=i.holds if core.kp else "ki e",
+        limits=_integral_limits(core.read, i.limits),
+        starts=i.starts,
+        deadband=core.read.pick(i.deadband, 0.0) or None,
+        windup=i.windup.with_numbers(core),
+    )
 
 
-def _level(read: Reader, given: str | float, default: float) -> float:
-    """Return a level of the output [%]: a level in engineering units counts from the low end of the range."""
-    level, low = read.pick(given, default), read.settings.op_range.low if read.settings.op_range is not None else 0.0
-    in_units = isinstance(given, str) and parse_unit(read.settings[given].unit).dimension is Dimension.PV_UNITS
-    return level - 100 * low / read.spans.op if in_units and read.settings.equation.signals == "percent" else level
-
-
-def _tracking(read: Reader, rate: float, time: float, kp: float, ki: float, kd: float) -> float:
-    """Return the time in which the integral follows the cut-off [s] (specs/equations.md, section 5)."""
-    parallel = read.settings.equation.form is Form.PARALLEL
-    integral_time = abs(kp / ki if parallel and kp else 1 / rate)
-    both = abs(kd / ki) if parallel else abs(integral_time * time)  # Ti Td
-    known = {"Ti": integral_time, "sqrt(Ti Td)": math.sqrt(both) if both else integral_time}
-    windup = read.settings.equation.integral.windup
-    if not isinstance(windup, WindupBackCalculation):
-        return integral_time
-    given = windup.tracking_time
-    if isinstance(given, str) and given in known:
-        return known[given]
-    found = read.pick(given, 0.0)
-    if not found and windup.when_off is not None:
-        return known[windup.when_off]
-    return found * integral_time if windup.times == "Ti" else found
-
-
-def _integral_limits(read: Reader, limits: IntegralLimits | None) -> tuple[float | None, float | None] | None:
+def _integral_limits(read: Reader[X], limits: IntegralLimits[Reference] | None) -> IntegralLimits[X] | None:
+    """Return the limits with both ends; one that is off is no limit."""
     if limits is None:
         return None
-
-    def one(given: str | float | None) -> float | None:
-        return None if given == "output" else read.pick(given, math.inf)
-
-    high = one(limits.high)
-    if limits.low is not None:
-        low = one(limits.low)
-        return (-math.inf if isinstance(limits.low, str) and limits.low != "output" and low == math.inf else low), high
-    return None if high is None else -high, high
+    high: Any = "output" if limits.high == "output" else read.pick(limits.high, math.inf)
+    if limits.low is None:
+        return IntegralLimits(high=high, low="output" if high == "output" else -high)
+    low: Any = "output" if limits.low == "output" else read.pick(limits.low, math.inf)
+    return IntegralLimits(high=high, low=-math.inf if isinstance(limits.low, str) and low == math.inf else low)
 
 
-def _transfer(equation: Equation) -> dict[str, Any]:
-    t = equation.transfer
-    return {
-        "start": t.start,
-        "keeps_integral": t.without_integral == "kept",
-        "first_scan_holds": t.first_scan == "holds",
-        "loads_as_it_is": t.loaded == "as-it-is",
-        "zero_power_up": t.power_up == "zero",
-        "derivative_start": t.derivative,
-        "derivative_from_zero": equation.derivative.starts == "zero",
-        "integral_from_zero": equation.integral.starts == "zero",
-        "zero_first_output": t.first_output == "zero",
-        "manual_output": t.manual_output,
-        "bumpless_changes": t.changes == "bumpless",
-    }
+def _derivative(d: Derivative[Reference]) -> Derivative[X]:
+    f = _at_work(d)
+    filt: Filter[X] | None = None if f is None else Filter(applies_to=f.applies_to, order=f.order, of=f.of, rule=f.rule)
+    return Derivative(on=d.on, rule=d.rule, starts=d.starts, filter=filt)
 
 
-def _lag(read: Reader, signal: Setpoint | Measurement | ErrorShape | None, h: float) -> Lag | None:
+def _lag(read: Reader[X], filt: SignalFilter[Reference] | None, h: float) -> SignalFilter[X] | None:
     """Return a signal's filter, or ``None`` where there is none or it is off."""
-    filt = None if signal is None else signal.filter
     if filt is None:
         return None
     if filt.factor is None:
         time = read.pick(filt.time, 0.0)
-        return Lag(time, 1.0, filt.rule) if time else None
+        return SignalFilter(time=time, rule=filt.rule) if time else None
     factor = read.pick(filt.factor, 1.0)
     if not 0 < factor <= 1:
         raise SettingError(f"{read.settings.card.id}: {filt.factor} is {factor:g}; a share of the new sample is above 0, up to 1")
-    return Lag(read.number(h) * (1 - factor) / factor, factor, filt.rule) if factor != 1 else None
+    return SignalFilter(time=read.number(h) * (1 - factor) / factor, factor=factor, rule=filt.rule) if factor != 1 else None
 
 
-def _shape(read: Reader, equation: Equation) -> Shape | None:
-    """Return what is done to the error, or ``None`` where that is nothing; P on the measurement itself is no error."""
-    error = equation.error
-    if error is None or error.shape == "linear":
-        return None
-    band, linearity = read.pick(error.band, 0.0), read.pick(error.linearity, 1.0)
-    if (error.shape == "gap" and not band) or (error.shape == "gain-linear" and linearity == 1):
-        return None
-    gain = read.value(error.gain) if isinstance(error.gain, str) else error.gain
-    in_cascade = equation.proportional if equation.cascade is None else equation.cascade.proportional
-    return Shape(
-        kind=error.shape,
-        band=band,
-        gain=gain,
-        subtracted=error.subtracted,
-        zero_crossing=error.zero_crossing,
-        open_edge=error.edge == "outside",
-        linearity=linearity,
-        over=error.over,
-        on_integral=error.on != "proportional",
-        on_proportional=error.on != "integral" and equation.proportional.on != "pv",
-        on_cascade=error.on != "integral" and in_cascade.on != "pv",
+def _setpoint(read: Reader[X], sp: Setpoint[Reference] | None, h: float) -> Setpoint[X]:
+    if sp is None:
+        return Setpoint()
+    return Setpoint(
+        filter=_lag(read, sp.filter, h),
+        rate=_unless_off(read, sp.rate),
+        rate_down=None if sp.rate_down is None else read.pick(sp.rate_down, math.inf),
+        rate_counts=sp.rate_counts,
+        starts=sp.starts,
+        tracks=sp.tracks,
     )
 
 
-def _signals(read: Reader, equation: Equation, h: float) -> dict[str, Any]:
-    sp, pv, error, ff = equation.setpoint, equation.measurement, equation.error, equation.feedforward
-    cascade = None if equation.cascade is None else equation.cascade.proportional
-    b = _weight(read, equation.proportional.on, equation.proportional.weight)
-    rate = math.inf if sp is None else read.pick(sp.rate, math.inf)
-    other_b = b if cascade is None else _weight(read, cascade.on, cascade.weight)
-    return {
-        "sp_filter": _lag(read, sp, h),
-        "sp_rate": rate,
-        "sp_rate_down": rate if sp is None or sp.rate_down is None else read.pick(sp.rate_down, math.inf),
-        "sp_rate_local": sp is not None and sp.rate_counts == "local",
-        "sp_from_zero": sp is not None and sp.starts == "zero",
-        "sp_tracks": sp is not None and sp.tracks,
-        "pv_filter": _lag(read, pv, h),
-        "previous_pv": pv is not None and pv.previous_scan,
-        "e_filter": _lag(read, error, h),
-        "shape": _shape(read, equation),
-        "cascade_b": None if other_b == b else other_b,
-        "feedforward": None if ff is None else read.pick(ff.gain, 0.0),
-        "feedforward_after": ff is not None and ff.summed == "after-limits",
-    }
+def _unless_off(read: Reader[X], rate: Reference | None) -> Any:
+    """Return a rate limit, or ``None`` where it is off."""
+    found = read.pick(rate, math.inf)
+    return None if found == math.inf else found
 
 
-def _output(read: Reader, equation: Equation) -> dict[str, Any]:
-    arithmetic = equation.arithmetic
-    numbers: dict[str, Any] = {
-        "output_rate": read.pick(equation.output.rate, math.inf),
-        "output_deadband": read.level_of_output(equation.output.deadband),
-        "resolution": read.pick(equation.output.resolution, 0.0),
-    }
-    if arithmetic is not None:
-        numbers |= {
-            "precision": arithmetic.type,
-            "wide_literals": arithmetic.literals == "float64",
-            "counts": arithmetic.counts or 1,
-            "gain_counts": arithmetic.gain_counts or 1,
-        }
-    return numbers
+def _measurement(read: Reader[X], pv: Measurement[Reference] | None, h: float) -> Measurement[X]:
+    return Measurement() if pv is None else Measurement(filter=_lag(read, pv.filter, h), previous_scan=pv.previous_scan)
 
 
-def _dahlin(read: Reader) -> Dahlin:
+def _error(read: Reader[X], error: ErrorShape[Reference] | None, h: float) -> ErrorShape[X]:
+    """Return what is done to the error; linear where its shape does nothing."""
+    if error is None:
+        return ErrorShape()
+    filt, band, linearity = _lag(read, error.filter, h), read.pick(error.band, 0.0), read.pick(error.linearity, 1.0)
+    idle = (error.shape == "gap" and not band) or (error.shape == "gain-linear" and linearity == 1)
+    if error.shape == "linear" or idle:
+        return ErrorShape(filter=filt)
+    return ErrorShape(
+        filter=filt,
+        shape=error.shape,
+        band=band,
+        gain=read.value(error.gain) if isinstance(error.gain, str) else read.number(error.gain),
+        subtracted=error.subtracted,
+        zero_crossing=error.zero_crossing,
+        edge=error.edge,
+        linearity=linearity,
+        over=error.over,
+        on=error.on,
+    )
+
+
+def _feedforward(read: Reader[X], ff: Feedforward[Reference] | None) -> Feedforward[X] | None:
+    return None if ff is None else Feedforward(summed=ff.summed, gain=read.pick(ff.gain, 0.0))
+
+
+def _output(read: Reader[X], output: Output[Reference]) -> Output[X]:
+    return Output(
+        limits=output.limits,
+        rate=_unless_off(read, output.rate),
+        deadband=read.level_of_output(output.deadband) or None,
+        resolution=read.pick(output.resolution, 0.0) or None,
+    )
+
+
+def _dahlin(read: Reader[X]) -> Dahlin:
     found = Dahlin(
         gain=read.role(Role.PROCESS_GAIN, 1.0),
         time=read.role(Role.PROCESS_TIME, 0.0),

@@ -9,10 +9,11 @@ from dataclasses import replace
 from math import nan
 from typing import Final
 
-from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.algorithm.model import Algorithm
 from pidemu.analysis.figures import loop_figures, scan_for, time_scale
 from pidemu.analysis.open_loop import OpenLoop
 from pidemu.card.model.base import Rule
+from pidemu.card.model.signals import Measurement, SignalFilter
 from pidemu.controller.running import Running
 from pidemu.law.law import Law
 from pidemu.process.hold import Plant
@@ -190,16 +191,15 @@ def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Ite
 def _as_continuous(a: Algorithm) -> Algorithm:
     """Return the algorithm with the backward rule throughout, and filter times that do not depend on the scan interval."""
 
-    def lag(x: Lag | None) -> Lag | None:
-        return None if x is None else Lag(x.time)
+    def lag(f: SignalFilter[float] | None) -> SignalFilter[float] | None:
+        return None if f is None else SignalFilter(time=f.time)
 
+    filt = a.derivative.filter
     return replace(
         a,
-        integral_rule=Rule.BACKWARD,
-        derivative_rule=Rule.BACKWARD,
-        filter_rule=Rule.BACKWARD,
-        sp_filter=lag(a.sp_filter),
-        pv_filter=lag(a.pv_filter),
-        e_filter=lag(a.e_filter),
-        previous_pv=False,
+        integral=replace(a.integral, rule=Rule.BACKWARD),
+        derivative=replace(a.derivative, rule=Rule.BACKWARD, filter=None if filt is None else replace(filt, rule=None)),
+        setpoint=replace(a.setpoint, filter=lag(a.setpoint.filter)),
+        measurement=Measurement(filter=lag(a.measurement.filter)),
+        error=replace(a.error, filter=lag(a.error.filter)),
     )

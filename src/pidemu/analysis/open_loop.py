@@ -137,7 +137,7 @@ def _corners(loop: OpenLoop) -> list[float]:
     kp, ki, kd = abs(a.kp), abs(a.ki), abs(a.kd)
     found = [abs(r) for r in (*P.poles, *P.zeros)]
     found += [x / y for x, y in ((ki, kp), (kp, kd)) if y] + ([math.sqrt(ki / kd)] if kd else [])
-    times = [P.delay, a.Tf, *(lag.time for lag in (a.sp_filter, a.pv_filter, a.e_filter) if lag is not None)]
+    times = [P.delay, a.Tf, *(f.seconds for f in a.signal_filters)]
     if a.dahlin is not None:
         times += [a.dahlin.time, a.dahlin.delay, a.dahlin.wanted]
     found += [1 / t for t in times if t]

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from pidemu.card.document import Document, Path_, parse_file
 from pidemu.card.model.base import Evidence, Status
 from pidemu.card.model.card_file import CardFile, Equation, Setting
-from pidemu.card.references import named_settings
+from pidemu.card.references import makes_the_law, named_settings
 from pidemu.card.validation import problems
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import is_hidden
@@ -26,31 +26,6 @@ if TYPE_CHECKING:
 EMULATION = "emulation"
 """Evidence key for how the emulation was verified; it leads to no field."""
 _REPLACED_WHOLE = ("filter", "windup")
-_SCAN_BY_SCAN = ("implementation", "transfer", "action", "scan", "output", "arithmetic", "faults", "cascade", "feedforward")
-_SCAN_BY_SCAN_KEYS = (
-    "rule",
-    "windup",
-    "holds",
-    "limits",
-    "deadband",
-    "rate",
-    "starts",
-    "tracks",
-    "previous-scan",
-    "rate-down",
-    "rate-counts",
-)
-_BEYOND_THE_LAW = (
-    "tracking-time",
-    "integral-limit",
-    "windup-limit",
-    "deadband",
-    "bias",
-    "output-rate",
-    "setpoint-rate",
-    "resolution",
-)
-"""What dials set that the linear law leaves out."""
 MOST_COMBINATIONS: Final = 200
 """Combinations of options, all of which are checked."""
 _LONGEST_ID: Final = 200
@@ -138,9 +113,7 @@ class Statement:
     @property
     def makes_the_law(self) -> bool:
         """Whether the linear law depends on it; the rest matters scan by scan, at limits and at transfers only."""
-        head, *rest = self.path.split(".")
-        beyond = head in _SCAN_BY_SCAN or self.sets in _BEYOND_THE_LAW
-        return not beyond and not any(key in _SCAN_BY_SCAN_KEYS for key in rest)
+        return makes_the_law(self.path.split("."), self.sets)
 
     def __str__(self) -> str:
         note = f" ({self.evidence.note})" if self.evidence is not None and self.evidence.note else ""

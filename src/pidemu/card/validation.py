@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Any, Final, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from pidemu.card.document import Document, Path_
+from pidemu.card.model.base import hyphenated
+from pidemu.card.model.marks import fields_of, parts_in
 from pidemu.errors import Problem, suggest
 from pidemu.excerpt import shortened
 
 _LONGEST: Final = 60
 """Characters of a value that are shown."""
 _OF_NUMBERS: Final = ("not_a_number", "implausible")
+_UNKNOWN: Final = ("extra_forbidden", "unexpected_keyword_argument")
 Locate = Callable[[Path_], Path_]
 """From a path in the value that was validated to the path in the file."""
 
@@ -39,24 +42,24 @@ def _fields(model: type[BaseModel], path: Path_) -> list[str]:
 
 
 def _collect(annotation: Any, path: list[str | int], keys: set[str]) -> None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        if not path:
-            keys.update(f.alias or name for name, f in annotation.model_fields.items())
-            return
-        for name, f in annotation.model_fields.items():
-            if (f.alias or name) == path[0]:
-                _collect(f.annotation, path[1:], keys)
+    part = get_origin(annotation) or annotation
+    if isinstance(part, type) and parts_in(part):
+        for name, field in fields_of(part).items():
+            key = field.alias or hyphenated(name)
+            if not path:
+                keys.add(key)
+            elif key == path[0]:
+                _collect(field.annotation, path[1:], keys)
         return
-    args = getattr(annotation, "__args__", ())
-    container = getattr(annotation, "__origin__", None) in (dict, list, tuple)
-    for arg in args:
-        _collect(arg, path[1:] if container and path else path, keys)
+    container = part in (dict, list, tuple)
+    for argument in get_args(annotation):
+        _collect(argument, path[1:] if container and path else path, keys)
 
 
 def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel], scheme: object) -> str:
     kind, context = error["type"], error.get("ctx", {})
     shown = _shown(value)
-    if kind == "extra_forbidden":
+    if kind in _UNKNOWN:
         known = _fields(model, path[:-1])
         if path[-1] in known and scheme is not None:
             return f"'{path[-1]}' does not go with scheme '{scheme}'"
@@ -65,7 +68,7 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
         return _wrong_length(2, len(value))  # every tuple of the language is a pair
     if kind == "missing":
         return f"missing key '{error['loc'][-1]}'"
-    shapeless = kind in ("model_type", "dict_type", "model_attributes_type", "list_type", "tuple_type")
+    shapeless = kind in ("model_type", "dataclass_type", "dict_type", "model_attributes_type", "list_type", "tuple_type")
     if (value is None and not shapeless) or kind in ("string_too_short", "too_short"):
         return "empty; write it, or remove the key"
     match kind:
@@ -85,7 +88,7 @@ def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel
             return f"{shown} is not a number"
         case "bool_type" | "bool_parsing":
             return f"{shown} is neither true nor false"
-        case "model_type" | "dict_type" | "model_attributes_type":
+        case "model_type" | "dataclass_type" | "dict_type" | "model_attributes_type":
             return f"expected a mapping (key: value), found {_kind(value)}"
         case "list_type" | "tuple_type":
             return f"expected a list, found {_kind(value)}"
@@ -156,9 +159,9 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
     for detail in error.errors(include_url=False):
         path, here = _walk(value, detail["loc"])
         of_key = detail["loc"][-1] == "[key]"
-        at_key = of_key or detail["type"] in ("extra_forbidden", "union_tag_not_found")
+        at_key = of_key or detail["type"] in (*_UNKNOWN, "union_tag_not_found")
         at_key = at_key or (detail["type"] == "missing" and isinstance(detail["loc"][-1], str))
-        scheme = _walk(value, (*path[:-1], "scheme"))[1] if path and detail["type"] == "extra_forbidden" else None
+        scheme = _walk(value, (*path[:-1], "scheme"))[1] if path and detail["type"] in _UNKNOWN else None
         message = _message(detail, path, path[-1] if of_key else here, model, scheme if isinstance(scheme, str) else None)
         messages = found.setdefault((path, at_key), [])
         if detail["type"] in _OF_NUMBERS:  # that no text may stand there either is beside the point

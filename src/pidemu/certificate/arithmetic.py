@@ -12,7 +12,6 @@ import numpy as np
 from pidemu.backends.python import compiled
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.scaled_controller import Side
-from pidemu.controller.running import resting
 from pidemu.errors import PidemuError
 from pidemu.program.builder import build
 from pidemu.records.files import Record
@@ -58,7 +57,8 @@ def smallest_error(side: Side) -> float:
     ScanError
         It cannot be emulated at this interval.
     """
-    plain = replace(resting(side.own), shape=None, integral_deadband=None, integral_limits=None)
+    a = side.own.at_rest
+    plain = replace(a, error=replace(a.error, shape="linear"), integral=replace(a.integral, deadband=None, limits=None))
     scale = Scale(side.settings)
     program = build(plain, side.scan, limits=_FREE, initial_output=scale.output_own(50.0))
     functions = compiled(program)
@@ -88,10 +88,10 @@ def smallest_error(side: Side) -> float:
 def arithmetic_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
     """Yield the smallest errors that two controllers integrate, where these differ and one is large enough to be measured."""
     both = (source, target)
-    precisions = [side.own.precision for side in both]
+    precisions = [side.own.arithmetic.type for side in both]
     if precisions == ["float64", "float64"] or not all(side.integrates for side in both):
         return
-    kinds = " and ".join(f"{side.name} computes in {_KINDS[side.own.precision]}" for side in both)
+    kinds = " and ".join(f"{side.name} computes in {_KINDS[side.own.arithmetic.type]}" for side in both)
     try:
         least = smallest_error(source), smallest_error(target)
     except PidemuError as error:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from pidemu.algorithm.model import Shape
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.scaled_controller import Side, alike, unlimited
 
@@ -58,75 +57,67 @@ def _span(limits: Pair, unit: str) -> str:
 def _integral_limits(side: Side) -> Pair:
     """Return the limits of the integral term [% of the output span]; infinite where there are none."""
     a = side.own
-    if a.integral_limits is None:
+    if a.integral.limits is None:
         return -math.inf, math.inf
-    given = unlimited((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
-    gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.holds]
+    ends = zip((a.integral.limits.low, a.integral.limits.high), side.limits, strict=True)
+    low, high = (own if given is None or isinstance(given, str) else given for given, own in ends)
+    given = unlimited((low, high))
+    gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.integral.holds]
     zero = side.settings.own_ranges[1].low
     low, high = sorted((gain * x - zero) * side.op_percent for x in given)
     return low, high
-
-
-def _or(limit: float | None, instead: float) -> float:
-    return instead if limit is None else limit
 
 
 def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
     """Yield what is done to the error, and where the integral stands still for it."""
     figures = {
         "error: half width of the band [% of PV span]": _of(source, target, _band),
-        "error: gain within the band [-]": _of(source, target, lambda side: _gap(side).gain if _band(side) else 1.0),
+        "error: gain within the band [-]": _of(source, target, lambda side: side.own.error.gain if _band(side) else 1.0),
         "error: where a gain that grows with it is 1 [% of PV span]": _of(source, target, _over),
         "error: gain near zero [-]": _of(source, target, _linearity),
-        "integral deadband [% of PV span]": _of(source, target, lambda side: (side.own.integral_deadband or 0.0) * side.pv_percent),
+        "integral deadband [% of PV span]": _of(source, target, lambda side: (side.own.integral.deadband or 0.0) * side.pv_percent),
     }
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
-    shapes = [side.own.shape for side in (source, target)]
-    if found or _fine_print(shapes[0]) != _fine_print(shapes[1]):
+    if found or _fine_print(source) != _fine_print(target):
         words = "; ".join(f"{side.name} {_error_words(side)}" for side in (source, target))
         yield NonlinearDifference("error", f"The error is used differently: {words}.", found)
 
 
-def _gap(side: Side) -> Shape:
-    return side.own.shape or Shape("gap")
-
-
 def _band(side: Side) -> float:
-    return _gap(side).band * side.pv_percent if _gap(side).kind == "gap" else 0.0
+    return (side.own.error.band or 0.0) * side.pv_percent if side.own.error.shape == "gap" else 0.0
 
 
 def _over(side: Side) -> float:
-    return _gap(side).over * side.pv_percent if _gap(side).kind != "gap" else math.inf
+    return side.own.error.over * side.pv_percent if side.own.error.shape in ("squared", "gain-linear") else math.inf
 
 
 def _linearity(side: Side) -> float:
     """Return the gain near zero of a shape that has no band."""
-    shape = side.own.shape
-    return 1.0 if shape is None or shape.kind == "gap" else 0.0 if shape.kind == "squared" else shape.linearity
+    error = side.own.error
+    return {"squared": 0.0, "gain-linear": error.linearity or 0.0}.get(error.shape, 1.0)
 
 
-def _fine_print(shape: Shape | None) -> tuple[object, ...]:
+def _fine_print(side: Side) -> tuple[object, ...]:
     """Return what is not a number of a shape, but that of the mode in cascade."""
-    if shape is None:
-        return ()
-    return shape.kind, shape.subtracted, shape.zero_crossing, shape.on_integral, shape.on_proportional
+    a, error = side.own, side.own.error
+    return () if not a.is_shaped else (error.shape, error.subtracted, error.zero_crossing, a.shapes_integral, a.shapes_proportional)
 
 
 def _error_words(side: Side) -> str:
-    shape, band = side.own.shape, (side.own.integral_deadband or 0.0) * side.pv_percent
+    a, error, band = side.own, side.own.error, (side.own.integral.deadband or 0.0) * side.pv_percent
     still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
-    if shape is None:
+    if not a.is_shaped:
         return still or "uses it as it is"
-    if shape.kind == "gap":
-        gain = f"multiplies it by {shape.gain:g}" if shape.gain else "takes it as zero"
+    if error.shape == "gap":
+        gain = f"multiplies it by {error.gain:g}" if error.gain else "takes it as zero"
         text = f"{gain} within {_band(side):.4g} %"
-        text += ", and subtracts the band outside" if shape.subtracted else ""
-        text += ", from its first change of sign there" if shape.zero_crossing else ""
-    elif shape.kind == "squared":
+        text += ", and subtracts the band outside" if error.subtracted else ""
+        text += ", from its first change of sign there" if error.zero_crossing else ""
+    elif error.shape == "squared":
         text = f"squares it (gain 1 at {_over(side):.4g} %)"
     else:
-        text = f"gives it a gain of {shape.linearity:g} near zero, rising to 1 at {_over(side):.4g} %"
-    where = "" if shape.on_integral and shape.on_proportional else " for the integral" if shape.on_integral else " for P"
+        text = f"gives it a gain of {error.linearity:g} near zero, rising to 1 at {_over(side):.4g} %"
+    where = "" if a.shapes_integral and a.shapes_proportional else " for the integral" if a.shapes_integral else " for P"
     return f"{text}{where}{' and ' + still if still else ''}"
 
 
@@ -136,9 +127,9 @@ def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifferen
         "output",
         (source, target),
         {
-            "output rate limit [%/s]": _of(source, target, lambda side: side.own.output_rate * side.op_percent),
-            "output deadband [%]": _of(source, target, lambda side: side.own.output_deadband * side.op_percent),
-            "output step [%]": _of(source, target, lambda side: side.own.resolution * side.op_percent),
+            "output rate limit [%/s]": _of(source, target, lambda side: _endless(side.own.output.rate) * side.op_percent),
+            "output deadband [%]": _of(source, target, lambda side: (side.own.output.deadband or 0.0) * side.op_percent),
+            "output step [%]": _of(source, target, lambda side: (side.own.output.resolution or 0.0) * side.op_percent),
         },
         [],
     )
@@ -152,26 +143,32 @@ def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False
     words = [
         f"On {side.name} the setpoint follows PV in manual and stays there until it is changed"
         for side, other in ((source, target), (target, source))
-        if side.own.sp_tracks and not other.own.sp_tracks
+        if side.own.setpoint.tracks and not other.own.setpoint.tracks
     ]
     words += [
         f"On {side.name} the rate-limited setpoint starts at zero at power-up"
         for side, other in ((source, target), (target, source))
         if _from_zero(side) and not _from_zero(other)
     ]
-    free = [in_cascade and side.own.sp_rate_local for side in (source, target)]
+    free = [in_cascade and side.own.setpoint.rate_counts == "local" for side in (source, target)]
     up, down = (
         tuple(math.inf if none else rate * side.pv_percent for none, rate, side in zip(free, rates, (source, target), strict=True))
-        for rates in ([s.own.sp_rate for s in (source, target)], [s.own.sp_rate_down for s in (source, target)])
+        for rates in zip(*((_endless(s.own.setpoint.rate), _endless(s.own.setpoint.fall)) for s in (source, target)), strict=True)
     )
     rates = {"setpoint rate limit [%/s]": (up[0], up[1]), "setpoint rate limit downwards [%/s]": (down[0], down[1])}
-    if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(s.own.sp_rate == s.own.sp_rate_down for s in (source, target)):
+    if alike(*rates["setpoint rate limit downwards [%/s]"]) or all(
+        s.own.setpoint.rate == s.own.setpoint.fall for s in (source, target)
+    ):
         del rates["setpoint rate limit downwards [%/s]"]
     yield from _numbers("setpoint", (source, target), rates, words)
 
 
+def _endless(rate: float | None) -> float:
+    return math.inf if rate is None else rate
+
+
 def _from_zero(side: Side) -> bool:
-    return side.own.sp_from_zero and math.isfinite(side.own.sp_rate)
+    return side.own.setpoint.starts == "zero" and side.own.setpoint.rate is not None
 
 
 def _numbers(aspect: str, both: tuple[Side, Side], figures: Figures, words: list[str]) -> Iterator[NonlinearDifference]:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Final, Literal, cast
 
-from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.algorithm.model import Algorithm
 from pidemu.algorithm.resolve import Reader, algorithm_as_read
 from pidemu.card.model.card_file import default_scan
+from pidemu.card.model.signals import SignalFilter
 from pidemu.law import law as laws
 from pidemu.law.exact import Exact, as_typed, exact
 from pidemu.law.rational import Rational, add, multiply
@@ -110,8 +111,8 @@ def polynomial_text(p: Sequence[Exact]) -> str:
     return text or "0"
 
 
-@dataclass(frozen=True, slots=True)
-class ExactReader(Reader):
+@dataclass(frozen=True)
+class ExactReader(Reader[Exact]):
     """Reads a card's dials and numbers without rounding.
 
     Attributes
@@ -157,7 +158,7 @@ def exact_spans(settings: Settings) -> Spans:
     return Spans(*spans, settings.spans.degree)
 
 
-def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None) -> Algorithm:
+def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None) -> Algorithm[Exact]:
     """Return the algorithm with exact numbers in the law's part.
 
     Parameters
@@ -174,18 +175,18 @@ def exact_algorithm(settings: Settings, dials: Mapping[str, Exact] | None = None
     """
     read = algorithm_as_read(ExactReader(settings, exact_spans(settings), dials=dials or {}), settings.scan)
     if settings.pace != 1:
-        read = read.paced(cast(float, as_typed(settings.pace)))
-    if settings.lag and read.pv_filter is None:
-        read = replace(read, pv_filter=Lag(cast(float, as_typed(settings.lag))))
+        read = read.paced(as_typed(settings.pace))
+    if settings.lag and read.measurement.filter is None:
+        read = read.filtered(SignalFilter(time=as_typed(settings.lag)))
     return read
 
 
-def in_mode(a: Algorithm, path: PathName) -> Algorithm:
+def in_mode(a: Algorithm[Exact], path: PathName) -> Algorithm[Exact]:
     """Return the algorithm with the setpoint weight of the mode that a path is of."""
     return a.in_cascade if path == "setpoint in cascade" else a
 
 
-def exact_paths(a: Algorithm, names: Sequence[PathName], factor: Exact | int = 1) -> dict[PathName, ExactLaw]:
+def exact_paths(a: Algorithm[Exact], names: Sequence[PathName], factor: Exact | int = 1) -> dict[PathName, ExactLaw]:
     """Return paths of the continuous law of an algorithm with exact numbers, by name.
 
     Parameters
@@ -211,13 +212,13 @@ def exact_paths(a: Algorithm, names: Sequence[PathName], factor: Exact | int = 1
     return found
 
 
-def _quotient(a: Algorithm, name: PathName) -> Rational:
+def _quotient(a: Algorithm[Exact], name: PathName) -> Rational:
     """Return a path as its terms make it, not in lowest terms."""
     both: tuple[Rational, Rational] = laws.paths(in_mode(a, name), laws.CONTINUOUS)
     return both[name != "feedback"]
 
 
-def difference(source: Algorithm, target: Algorithm, name: PathName, factor: Exact) -> float:
+def difference(source: Algorithm[Exact], target: Algorithm[Exact], name: PathName, factor: Exact) -> float:
     """Return the largest difference of the coefficients of the cross products of two paths.
 
     Each is relative to the sum of the sizes of everything that the coefficient is the sum of, so that rounded numbers that cancel
@@ -245,11 +246,11 @@ def difference(source: Algorithm, target: Algorithm, name: PathName, factor: Exa
     return float(largest)
 
 
-def _sizes(a: Algorithm) -> Algorithm:
+def _sizes(a: Algorithm[Exact]) -> Algorithm[Exact]:
     """Return an algorithm whose law is the sum of the sizes of all terms."""
     a = replace(a, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd), c=abs(a.c))
     return replace(a, b=_size_of_weight(a, a.b), cascade_b=None if a.cascade_b is None else _size_of_weight(a, a.cascade_b))
 
 
-def _size_of_weight(a: Algorithm, b: Any) -> Any:
+def _size_of_weight(a: Algorithm[Exact], b: Any) -> Any:
     return 1 + abs(b - 1) if a.series and a.c else abs(b)  # the series form takes P on the error, and adds what b is beyond 1

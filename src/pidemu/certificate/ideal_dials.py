@@ -67,8 +67,8 @@ class Dials:
         """Yield exact dials, by name, with which the target's feedback path is the source's, without those that do not change."""
         a = self.algorithm
         core = source
-        for lag in (a.e_filter, a.pv_filter):
-            core = core if lag is None else core.times((1, lag.time))
+        for lag in (a.error.filter, a.measurement.filter):
+            core = core if lag is None else core.times((1, lag.seconds))
         for Tf in self._filter_times(core):
             lag_ = (1, Tf, Tf * Tf / 2) if a.filter_order == 2 and a.filter_on != "term" else (1, Tf)
             top = multiply(multiply(core.num, (_ZERO, exact(1))), trimmed(lag_))
@@ -175,7 +175,7 @@ class Dials:
         return {}
 
 
-def _solve(a: Algorithm, unknown: list[str], source: ExactLaw, path: PathName) -> list[Exact]:
+def _solve(a: Algorithm[Exact], unknown: list[str], source: ExactLaw, path: PathName) -> list[Exact]:
     """Return the weights that a setpoint path needs; it is linear in them."""
 
     def values(**weights: float) -> list[Exact]:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation
+from pidemu.card.model.signals import SignalFilter
 from pidemu.certificate.exact_law import ExactLaw, PathName, in_mode
 from pidemu.law.exact import Exact, exact
 
 
-def law_text(equation: Equation, a: Algorithm, path: PathName, law: ExactLaw, factor: Exact) -> str:
+def law_text(equation: Equation, a: Algorithm[Exact], path: PathName, law: ExactLaw, factor: Exact) -> str:
     """Return a path in both ways, such as ``2 (1 + 1/(15 s)) (1 + 6 s)/(1 + 3/4 s) = (2/15 + 14/5 s + 12 s^2)/(s (1 + 3/4 s))``.
 
     Parameters
     ----------
     equation : Equation
         The card's equation.
-    a : Algorithm
+    a : Algorithm[Exact]
         The algorithm with exact numbers.
     path : str
         Which path.
@@ -31,7 +32,7 @@ def law_text(equation: Equation, a: Algorithm, path: PathName, law: ExactLaw, fa
     return plain if drawn in ("", plain) else f"{drawn} = {plain}"
 
 
-def _drawn(equation: Equation, a: Algorithm, path: PathName) -> str:
+def _drawn(equation: Equation, a: Algorithm[Exact], path: PathName) -> str:
     """Return the path as its block diagram is drawn, or nothing where the quotient says it as well."""
     kp, ki, kd, Tf = (exact(x) for x in (a.kp, a.ki, a.kd, a.Tf))
     setpoint = path != "feedback"
@@ -72,15 +73,15 @@ def _derivative(gain: Exact, Tf: Exact) -> str:
     return f"{_rate(gain)}/{_lag(Tf)}" if Tf else _rate(gain)
 
 
-def _lags(a: Algorithm, setpoint: bool) -> list[str]:
+def _lags(a: Algorithm[Exact], setpoint: bool) -> list[str]:
     """Return the filters that a path is divided by."""
     found = []
     if a.filter_on == "output" or (a.filter_on == "measurement" and not setpoint):
         Tf = exact(a.Tf)
         second = f" + {_number(Tf * Tf / 2)} s^2" if a.filter_order == 2 and a.filter_on == "measurement" else ""
         found += [f"(1 + {_rate(Tf)}{second})"] if Tf else []
-    signals: tuple[Lag | None, ...] = (a.e_filter, a.sp_filter if setpoint else a.pv_filter)
-    return [*found, *(_lag(exact(lag.time)) for lag in signals if lag is not None and lag.time)]
+    signals: tuple[SignalFilter[Exact] | None, ...] = (a.error.filter, a.setpoint.filter if setpoint else a.measurement.filter)
+    return [*found, *(_lag(exact(lag.seconds)) for lag in signals if lag is not None and lag.seconds)]
 
 
 def _lag(time: Exact) -> str:

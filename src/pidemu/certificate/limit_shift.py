@@ -142,7 +142,11 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
 def _after(side: Side, error: float, start: float, limits: tuple[float, float]) -> float:
     """Return the output [% of its span] after the measurement has moved by `error`, such that the output rises, and come back."""
     a = side.own
-    times = (abs(a.kd / a.kp) if a.kp else 0.0) + a.Tf + sum(f.at(side.scan) for f in (a.pv_filter, a.e_filter) if f is not None)
+    times = (
+        (abs(a.kd / a.kp) if a.kp else 0.0)
+        + a.Tf
+        + sum(f.at(side.scan) for f in (a.measurement.filter, a.error.filter) if f is not None)
+    )
     n = int(min(max(_SLOW * times / side.scan, _SCANS), _MOST_SCANS))
     x = np.arange(5 * n + 1) / n
     pv = REST - side.sign * error * np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 0.0])

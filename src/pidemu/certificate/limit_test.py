@@ -13,7 +13,6 @@ from pidemu.certificate.recovery import Recoveries, Recovery, recoveries
 from pidemu.certificate.scaled_controller import Side
 from pidemu.certificate.trials import Bench, Plan
 
-_TRACKING: Final = 0.01
 """Relative difference of tracking times that counts."""
 _MORE: Final = 2.0
 """With noise the outputs are so many times further apart than without, where that is worth another sentence."""
@@ -83,9 +82,7 @@ def unknown_windup(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDi
 
 
 def _same_scheme(mine: Side, other: Side) -> bool:
-    a, b = mine.own, other.own
-    alike = (a.windup, a.gate, a.implicit_tracking) == (b.windup, b.gate, b.implicit_tracking)
-    return alike and (a.windup != "back-calculation" or math.isclose(a.tracking_time, b.tracking_time, rel_tol=_TRACKING))
+    return mine.own.integral.windup.acts_like(other.own.integral.windup)
 
 
 def _scheme(side: Side) -> str:

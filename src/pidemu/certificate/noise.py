@@ -96,7 +96,7 @@ def _beyond_the_corner(law: Law) -> float:
     a = law.algorithm
     times = [
         a.Tf if a.has_signal_filter or a.has_term_filter else 0.0,
-        *(f.time for f in (a.pv_filter, a.e_filter) if f is not None),
+        *(f.seconds for f in (a.measurement.filter, a.error.filter) if f is not None),
     ]
     fastest = min((t for t in times if t), default=0.0)
     return float(np.abs(law.response(np.geomspace(1, 1e3, 301) / fastest)).max()) if fastest else 0.0
@@ -180,8 +180,8 @@ def _digits(x: float) -> str:
 def _filter_time(settings: Settings, h: float | None) -> float:
     """Return the filter times that the measurement passes on its way through the derivative [s]."""
     a = settings.algorithm(scan=h)
-    before = [lag.time if h is None else lag.at(h) for lag in (a.pv_filter, a.e_filter) if lag is not None]
-    return a.Tf + sum(before)
+    before = [lag.seconds if h is None else lag.at(h) for lag in (a.measurement.filter, a.error.filter) if lag is not None]
+    return float(a.Tf + sum(before))
 
 
 def _kept_by(target: Settings, h: float | None, wanted: float) -> Value | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from pidemu.card.model.around import STARTS
 from pidemu.certificate.arithmetic import arithmetic_differences
 from pidemu.certificate.differences import error_differences, limit_differences, output_differences, setpoint_differences
 from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
@@ -115,16 +114,16 @@ def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan
     """Yield how differently the transfers between manual and automatic go (section 6)."""
     (hand, auto), (new_hand, new_auto) = (bench.transfers() for bench in benches)
     to_auto, to_manual = (auto, new_auto), (hand, new_hand)
-    least = _BUMP if all(side.own.precision == "float64" for side in both) else _ROUNDED_BUMP
+    least = _BUMP if all(side.own.arithmetic.type == "float64" for side in both) else _ROUNDED_BUMP
     parts = []
     if abs(auto - new_auto) > least:
         parts.append(
             f"Switched to automatic with PV {trial.offset:.3g} % above SP, the output jumps by {_jumps(to_auto)}"
-            f"{_each(both, [STARTS[side.own.start] for side in both])}."
+            f"{_each(both, [side.own.transfer.way.of_a_controller for side in both])}."
         )
     if abs(hand - new_hand) > least:
         parts.append(f"Switched to manual at its present output, it jumps by {_jumps(to_manual)}.")
-    manuals = [_MANUAL[side.own.manual_output] for side in both]
+    manuals = [_MANUAL[side.own.transfer.manual_output] for side in both]
     if manuals[0] != manuals[1]:
         parts.append(f"In manual {both[0].name} {manuals[0]}, {both[1].name} {manuals[1]}.")
     if parts:
@@ -134,7 +133,7 @@ def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan
 
 def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDifference]:
     """Yield what the cards say where the transfers cannot be tried."""
-    ways = [f"{STARTS[side.own.start]}; in manual it {_MANUAL[side.own.manual_output]}" for side in both]
+    ways = [f"{side.own.transfer.way.of_a_controller}; in manual it {_MANUAL[side.own.transfer.manual_output]}" for side in both]
     if ways[0] != ways[1]:
         each = ". ".join(f"{side.name} {w}" for side, w in zip(both, ways, strict=True))
         yield NonlinearDifference(

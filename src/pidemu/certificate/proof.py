@@ -143,7 +143,7 @@ class _Exactly:
     ----------
     settings : Settings
         Its settings.
-    algorithm : Algorithm
+    algorithm : Algorithm[Exact]
         Its algorithm, with exact numbers.
     factor : Exact
         What its law is multiplied by.
@@ -154,7 +154,7 @@ class _Exactly:
     """
 
     settings: Settings
-    algorithm: Algorithm
+    algorithm: Algorithm[Exact]
     factor: Exact
     laws: Laws
     dials: Mapping[str, Exact] = field(default_factory=dict)
@@ -204,7 +204,7 @@ def prove(source: Settings, target: Settings, factor: Fraction | float = 1, mode
         return Proof(source.card.id, target.card.id, decided=False, why_not=str(error))
 
 
-def _names(both: tuple[Algorithm, Algorithm], mode: Mode) -> Iterator[PathName]:
+def _names(both: tuple[Algorithm[Exact], Algorithm[Exact]], mode: Mode) -> Iterator[PathName]:
     yield "feedback"
     if mode != "cascade":
         yield "setpoint"

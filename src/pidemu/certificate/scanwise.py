@@ -138,15 +138,15 @@ def emulated(
 def _rules(settings: Settings) -> tuple[object, ...]:
     """Return what makes a sequence of outputs out of a law: scan rules, order of things within a scan."""
     a = settings.algorithm()
-    lags = (a.sp_filter, a.pv_filter, a.e_filter)
-    mixed = bool(a.ki and a.kd) and a.integral_rule is not a.derivative_rule  # then a product of both is not a sum of both
+    lags = (a.setpoint.filter, a.measurement.filter, a.error.filter)
+    mixed = bool(a.ki and a.kd) and a.integral.rule is not a.derivative.rule  # then a product of both is not a sum of both
     return (
         mixed and a.series,
-        a.integral_rule if a.ki else None,
-        a.derivative_rule if a.kd else None,
+        a.integral.rule if a.ki else None,
+        a.derivative.rule if a.kd else None,
         a.filter_rule if a.Tf else None,
-        a.previous_pv,
-        a.precision,
+        a.measurement.previous_scan,
+        a.arithmetic.type,
         *(lag and lag.rule for lag in lags),
     )
 

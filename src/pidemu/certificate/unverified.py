@@ -163,9 +163,9 @@ def _at_work(settings: Settings, a: Algorithm, path: list[str]) -> bool:
         return rest[0] != "derivative" or bool(a.kd or a.Tf)
     if head == "output":
         parts: Mapping[str, bool] = {
-            "rate": a.output_rate < float("inf"),
-            "deadband": bool(a.output_deadband),
-            "resolution": bool(a.resolution),
+            "rate": a.output.rate is not None,
+            "deadband": bool(a.output.deadband),
+            "resolution": bool(a.output.resolution),
         }
         return parts.get(rest[0], True)
     everything: Mapping[str, bool] = {
@@ -191,16 +191,20 @@ def _term_at_work(settings: Settings, a: Algorithm, head: str, rest: list[str]) 
     """Tell whether a field of a term, or of what is done to a signal, makes a difference."""
     if head == "integral":
         if rest[0] == "deadband":
-            return bool(a.ki and a.integral_deadband)
-        return bool(a.ki) or settings.equation.integral.on == "none" or (rest[0] == "windup" and a.limits_without_integral)
+            return bool(a.ki and a.integral.deadband)
+        return (
+            bool(a.ki)
+            or settings.equation.integral.on == "none"
+            or (rest[0] == "windup" and a.integral.windup.limits_without_integral)
+        )
     if head == "derivative":
         return bool(a.Tf) and (bool(a.kd) or a.has_signal_filter) if rest[0] == "filter" else _derivative_at_work(settings, a, rest)
     if rest[0] == "filter":
-        return {"setpoint": a.sp_filter, "measurement": a.pv_filter, "error": a.e_filter}[head] is not None
+        return {"setpoint": a.setpoint.filter, "measurement": a.measurement.filter, "error": a.error.filter}[head] is not None
     if head == "error":
-        return a.shape is not None
+        return a.is_shaped
     if head == "setpoint" and rest[0] in ("rate", "starts"):
-        return a.sp_rate < float("inf")
+        return a.setpoint.rate is not None
     return True
 
 

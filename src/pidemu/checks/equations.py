@@ -11,7 +11,7 @@ from typing import Final
 
 from pidemu.card.document import Path_
 from pidemu.card.load import Variant, dotted
-from pidemu.card.model.base import Rule
+from pidemu.card.model.base import Reference
 from pidemu.card.model.card_file import Equation
 from pidemu.card.model.terms import Derivative, Proportional
 from pidemu.card.references import references
@@ -173,8 +173,8 @@ def reject_missing_dials(variant: Variant) -> Iterator[Problem]:
 
 def reject_bad_constants(variant: Variant) -> Iterator[Problem]:
     """A number in place of a setting's name is one that such a setting could have."""
-    for path, number, role in references(variant.equation):
-        wrong = _wrong_number(str(path[-1]), role, number) if isinstance(number, float) else None
+    for path, number, mark in references(variant.equation):
+        wrong = _wrong_number(str(path[-1]), mark.sets, number) if isinstance(number, float) else None
         if wrong is not None:
             yield variant.card.document.problem(variant.home(path), wrong)
 
@@ -191,7 +191,10 @@ def _wrong_number(field: str, role: str, x: float) -> str | None:
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
     """A weight goes with 'on: weighted' and with nothing else."""
     q = variant.equation
-    parts: list[tuple[Path_, Proportional | Derivative]] = [(("proportional",), q.proportional), (("derivative",), q.derivative)]
+    parts: list[tuple[Path_, Proportional[Reference] | Derivative]] = [
+        (("proportional",), q.proportional),
+        (("derivative",), q.derivative),
+    ]
     if q.cascade is not None:
         parts.append((("cascade", "proportional"), q.cascade.proportional))
     for path, part in parts:
@@ -227,23 +230,18 @@ def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
 
 
 def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
-    """The windup scheme fits the implementation and the rule."""
-    equation, document = variant.equation, variant.card.document
-    scheme, home = equation.integral.windup.scheme, variant.home(("integral", "windup"))
-    if (scheme == "velocity") != (equation.implementation == "velocity"):
-        yield document.problem(home, f"windup '{scheme}' does not go with implementation '{equation.implementation}'", at_key=True)
-    if scheme == "external-reset" and equation.integral.rule is Rule.TRAPEZOIDAL:
-        yield document.problem(home, "external-reset is defined for the backward and forward rules", at_key=True)
-    if equation.proportional.accumulated and (equation.proportional.on != "pv" or equation.implementation != "positional"):
+    """The windup scheme fits the equation that it stands in."""
+    home = variant.home(("integral", "windup"))
+    for message in variant.equation.integral.windup.faults(variant.equation):
+        yield variant.card.document.problem(home, message, at_key=True)
+
+
+def reject_accumulated_elsewhere(variant: Variant) -> Iterator[Problem]:
+    """Only a positional P on PV can be accumulated."""
+    P = variant.equation.proportional
+    if P.accumulated and (P.on != "pv" or variant.equation.implementation != "positional"):
         place = variant.home(("proportional", "accumulated"))
-        yield document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
-    if (
-        scheme == "clamp-sum"
-        and equation.implementation == "positional"
-        and equation.proportional.on == "pv"
-        and not equation.proportional.accumulated
-    ):
-        yield document.problem(home, "clamp-sum with P on pv needs 'proportional.accumulated: true'", at_key=True)
+        yield variant.card.document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
 
 
 def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
@@ -277,6 +275,7 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_weights,
     reject_bad_filter,
     reject_bad_windup,
+    reject_accumulated_elsewhere,
     *stages.RULES,
     reject_wrong_action,
 )

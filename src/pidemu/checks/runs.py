@@ -76,7 +76,7 @@ def _wrong_gains(card: Card, i: int, settings: Settings, stated: Canonical) -> I
 
 
 def _wrong_outputs(card: Card, i: int, settings: Settings, stated: list[float]) -> Iterator[Problem]:
-    limits = (-1e6, 1e6) if settings.algorithm().precision != "integer" else (0.0, 1e4)
+    limits = (-1e6, 1e6) if settings.algorithm().arithmetic.type != "integer" else (0.0, 1e4)
     controller = Controller(settings, output_limits=limits, initial_output=50.0)
     rest = controller.run(50.0, [50.0] * _AT_REST)[-1]
     for n, value in enumerate(controller.run(51.0, [50.0] * len(stated)) - rest):
@@ -129,7 +129,10 @@ def farthest(algorithm: Algorithm) -> tuple[float, float] | None:
         return None
     per_gain = 1 / abs(algorithm.kp) if algorithm.kp else 1.0
     kp, ki = algorithm.kp * per_gain, algorithm.ki * per_gain
-    bare = replace(algorithm.linear, kp=kp, ki=ki, kd=0.0, Tf=0.0, sp_filter=None, pv_filter=None, e_filter=None)
+    bare = replace(
+        algorithm.linear, kp=kp, ki=ki, kd=0.0, Tf=0.0,
+        setpoint=replace(algorithm.linear.setpoint, filter=None), error=replace(algorithm.linear.error, filter=None),
+    ).filtered(None)  # fmt: skip
     h = _INCREMENT / (_ERROR * abs(ki))
     run = compiled(program := build(bare, h, limits=(0.0, 100.0), initial_output=50.0)).run
     ends = []

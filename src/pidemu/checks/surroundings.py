@@ -6,13 +6,11 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from pidemu.card.load import Variant
-from pidemu.card.model.base import GENERAL_RULES, Rule
+from pidemu.card.model.base import GENERAL_RULES, Reference, Rule
 from pidemu.card.model.card_file import Equation
-from pidemu.card.model.integral import WindupBackCalculation, WindupGate
-from pidemu.card.model.terms import ErrorShape
+from pidemu.card.model.signals import ErrorShape
 from pidemu.errors import Problem
 from pidemu.settings.settings import limits
-from pidemu.units import Dimension, parse_unit
 
 
 def reject_bad_signal_filters(variant: Variant) -> Iterator[Problem]:
@@ -73,7 +71,7 @@ def reject_bad_error(variant: Variant) -> Iterator[Problem]:
         yield document.problem(home, "a filter on the error needs P and D on the error, in cascade too", at_key=True)
 
 
-def _idle_in_error(error: ErrorShape) -> Iterator[str]:
+def _idle_in_error(error: ErrorShape[Reference]) -> Iterator[str]:
     """Yield what is said of a shape that the error does not have."""
     if error.shape != "gap" and (error.gain != 0 or error.subtracted or error.zero_crossing or error.edge != "inside"):
         yield "'gain', 'subtracted', 'zero-crossing' and 'edge' belong to shape 'gap'"
@@ -119,60 +117,9 @@ def _wrong_state(equation: Equation) -> str | None:
         return "belongs to a positional implementation; remove it"
     if equation.form == "parallel":
         return "needs one gain for all terms, which the parallel form does not have; remove it"
-    if equation.integral.windup.scheme in ("clamp", "clamp-sum"):
+    if equation.integral.windup.limits_the_term:
         return f"does not go with windup '{equation.integral.windup.scheme}', which limits the term; use 'integral.limits'"
     return None
-
-
-def reject_bad_windup_details(variant: Variant) -> Iterator[Problem]:
-    """The fine print of a windup scheme goes with the scheme that it belongs to."""
-    windup, document, home = variant.equation.integral.windup, variant.card.document, variant.home(("integral", "windup"))
-    messages: Iterator[str] = iter(())
-    if isinstance(windup, WindupGate):
-        messages = _wrong_gate(windup, variant.equation.integral.rule)
-    elif isinstance(windup, WindupBackCalculation):
-        messages = _wrong_tracking(windup, variant.equation)
-    elif windup.scheme == "reset-outside-band" and variant.equation.proportional.on == "none":
-        messages = iter(("reset-outside-band needs a proportional term, whose band it is",))
-    for message in messages:
-        yield document.problem(home, message, at_key=True)
-
-
-def _wrong_gate(w: WindupGate, rule: Rule) -> Iterator[str]:
-    if w.scheme == "conditional":
-        if (w.judged_on, w.direction, w.resumes_from) != ("output", "further", "last"):
-            yield "'judged-on', 'direction' and 'resumes-from' belong to 'freeze'"
-        if w.last_increment == "dropped" and rule is Rule.FORWARD:
-            yield "'last-increment' has no meaning under the forward rule, whose increment comes after the output"
-        if w.test == "error-times-output" and w.last_increment != "dropped" and rule is not Rule.FORWARD:
-            yield "'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'"
-        return
-    if (w.test, w.last_increment) != ("increment", "to-the-limit"):
-        yield "'test' and 'last-increment' belong to 'conditional'"
-    if w.resumes_from != "last" and rule is not Rule.TRAPEZOIDAL:
-        yield "'resumes-from' belongs to the trapezoidal rule"
-    if w.judged_on == "sum" and rule is Rule.FORWARD:
-        yield "'judged-on: sum' needs this scan's increment in the sum: a backward or trapezoidal rule"
-    if w.judged_on == "sum" and w.direction != "both":
-        yield "'judged-on: sum' forgets the increment whichever way it goes: write 'direction: both'"
-    if w.judged_on == "sum" and w.resumes_from != "last":
-        yield "'resumes-from' has no meaning with 'judged-on: sum'"
-
-
-def _wrong_tracking(w: WindupBackCalculation, equation: Equation) -> Iterator[str]:
-    given = w.tracking_time
-    if given in ("Ti", "sqrt(Ti Td)") and (w.times is not None or w.when_off is not None):
-        yield "'times' and 'when-off' go with a number or a setting under 'tracking-time'"
-    elif isinstance(given, float) and w.when_off is not None:
-        yield "'when-off' goes with a setting under 'tracking-time'"
-    setting = equation.settings.get(given) if isinstance(given, str) else None
-    if setting is None or setting.sets != "tracking-time" or setting.unit not in ("1", "s", "min", "h", "ms", "scan"):
-        return
-    ratio = parse_unit(setting.unit).dimension is Dimension.RATIO
-    if ratio and w.times is None:
-        yield f"'{given}' is a plain ratio; say of what: 'times: Ti'"
-    if not ratio and w.times is not None:
-        yield f"'{given}' is a time already; remove 'times'"
 
 
 def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
@@ -182,9 +129,9 @@ def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
     if equation.implementation == "velocity" and (t.start, t.power_up, t.first_output) != ("bumpless", "transfer", "computed"):
         message = "a velocity implementation goes on from the last output: 'start: bumpless', without 'power-up' and 'first-output'"
         yield document.problem(home, message, at_key=True)
-    if t.first_scan == "holds" and t.start in ("bumpless", "tracked"):
+    if t.first_scan == "holds" and not t.way.can_hold:
         yield document.problem(home, f"'first-scan' has no meaning with start '{t.start}'", at_key=True)
-    if t.start != "load-output" and t.loaded != "limited":
+    if not t.way.loads_output and t.loaded != "limited":
         yield document.problem(home, "'loaded' belongs to start 'load-output'", at_key=True)
     if t.changes == "bumpless" and equation.integral.holds != "ki e":
         yield document.problem(home, "'changes: bumpless' needs an integral that holds 'ki e'", at_key=True)
@@ -287,7 +234,6 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_error,
     reject_bad_cascade,
     reject_bad_integral,
-    reject_bad_windup_details,
     reject_bad_transfer,
     reject_bad_feedforward,
     reject_bad_faults,

@@ -228,7 +228,7 @@ def _notes(
     a = controller.settings.algorithm()
     for what in a.too_coarse(controller.interval):
         yield f"a scan interval of {number(controller.interval)} s is long for these settings: {what}"
-    if not (a.ki or a.velocity or a.start == "load-output" or bias):
+    if not (a.ki or a.velocity or a.transfer.way.loads_output or bias):
         yield "without integral action the output in automatic is the terms alone, with a bias of 0; give --bias"
 
 

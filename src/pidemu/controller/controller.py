@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.backends.choice import Choice, Engine, checked, for_record
-from pidemu.card.model.around import Faults
 from pidemu.card.model.card_file import default_scan
+from pidemu.card.model.operation import Faults
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, stretches
@@ -287,7 +287,7 @@ class Controller:
         kept = {n: x for n, x in before.named().items() if not (other_signal and n in ("x1", "x2", "x3"))}
         after.take_over(kept, last)
         if last:
-            if new.algorithm().bumpless_changes and self._mode in ("automatic", "cascade"):
+            if new.algorithm().transfer.changes == "bumpless" and self._mode in ("automatic", "cascade"):
                 after.keep_output(before, last)
             bump = after.would_be(last) - before.would_be(last)
             changed = [f"{n} = {v.value:g}" for n, v in new.items() if n not in old or old[n].value != v.value]
@@ -303,12 +303,12 @@ class Controller:
     def _constant_left_by(self, new: Settings) -> float:
         """Return what the integral leaves behind where new settings switch it off and the card keeps it."""
         old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
-        if a.ki or a.velocity or not a.keeps_integral or a.start == "load-output":
+        if a.ki or a.velocity or a.transfer.without_integral != "kept" or a.transfer.way.loads_output:
             return 0.0
         if not old.ki or "I" not in self._running:
             return self._kept
         sign = 1.0 if self._action == "reverse" else -1.0
-        scale = {"ki e": 1.0, "e/Ti": sign * a.kp, "e": 0.0}[old.holds]
+        scale = {"ki e": 1.0, "e/Ti": sign * a.kp, "e": 0.0}[old.integral.holds]
         return scale * self._running["I"]
 
     def scan(
@@ -494,7 +494,7 @@ class Controller:
             u = self.output
             a = self.settings.algorithm()
             for name, value in (("own", u), ("on", 0.0)):
-                if name in self._running and not (name == "own" and a.start == "running"):
+                if name in self._running and not (name == "own" and a.transfer.way.runs_on):
                     self._running[name] = value
             if mode != self._mode:  # a transfer to automatic waits until something is computed
                 self._transfer(self._count, mode, u - was)
@@ -504,9 +504,9 @@ class Controller:
     def _by_hand(self, u: float, *, moved: bool) -> float:
         """Return the output in manual, as the card has it (`transfer.manual-output`)."""
         a = self.settings.algorithm(own_units=True)
-        if a.manual_output == "zero":
+        if a.transfer.manual_output == "zero":
             return 0.0
-        return a.gain_sign * a.kp * u if a.manual_output == "gain-times-operator" and moved else u
+        return a.action.gain_sign * a.kp * u if a.transfer.manual_output == "gain-times-operator" and moved else u
 
     def run(
         self,

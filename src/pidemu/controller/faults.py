@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from math import isfinite
 
 from pidemu.card.load import EMULATION, Card
-from pidemu.card.model.around import Faults
 from pidemu.card.model.base import Status
+from pidemu.card.model.operation import Faults
 from pidemu.errors import ScanError
 from pidemu.plausible import SIGNAL
 

@@ -155,7 +155,7 @@ class Running:
     def _before_a_scan_that_moves_nothing(self) -> Running:
         """Return this controller before the first scan, and that one such that it moves nothing."""
         a = self._algorithm(self.interval)
-        still = resting(a)
+        still = a.at_rest
         if still is not a:
             return Running(lambda _h: still, self._built, self.interval)
         other = copy(self)
@@ -192,23 +192,3 @@ def _resting(other: Running, by_hand: Mapping[str, float]) -> dict[str, float]:
     with other.quiet():
         other.compiled.scan(other.state, *other.inputs(by_hand))
     return other.named()
-
-
-_AT_REST: Final[Mapping[str, object]] = {
-    "start": "bumpless",
-    "first_scan_holds": False,
-    "zero_power_up": False,
-    "zero_first_output": False,
-    "derivative_start": "running",
-    "derivative_from_zero": False,
-    "integral_from_zero": False,
-    "sp_from_zero": False,
-    "manual_output": "operator",
-}
-
-
-def resting(a: Algorithm) -> Algorithm:
-    """Return the algorithm with a first scan that moves nothing and a transfer that does not bump; itself where it is so."""
-    if all(getattr(a, name) == value for name, value in _AT_REST.items()):
-        return a
-    return replace(a, **_AT_REST)  # type: ignore[arg-type]

@@ -61,7 +61,7 @@ class ClosedForms:
             target.idle_gain = gain.canonical or 1.0
 
     def _as_matched(self, a: Algorithm) -> Algorithm:
-        return replace(a, pv_filter=None) if self.target.is_paired else a
+        return a.filtered(None) if self.target.is_paired else a
 
     def textbook(self) -> Settings:
         """Return what the rule in manuals gives.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.card.load import Statement
-from pidemu.card.model.base import Form, Status
+from pidemu.card.model.base import Form, Reference, Status
 from pidemu.card.model.card_file import Equation
 from pidemu.card.model.terms import Filter
 from pidemu.card.references import is_active
@@ -147,7 +147,7 @@ def _in_words(statement: Statement, s: Settings, name: str) -> str | None:
     return None
 
 
-def _base(e: Equation, filt: Filter, rate: str) -> str:
+def _base(e: Equation, filt: Filter[Reference], rate: str) -> str:
     """Return what a filter's ratio or gain refers to."""
     gain = next((n for n, s in e.settings.items() if s.sets == Role.GAIN.value and is_active(e, n, s)), "the gain")
     return f"({rate}/{gain})" if filt.of == "derivative-time" and e.form is Form.PARALLEL else rate
@@ -200,10 +200,8 @@ _FORMS: Final = {Form.SERIES: "interacting (series)", Form.STANDARD: "noninterac
 
 def _with_filter(e: Equation, ratio: float) -> Equation:
     filt = e.derivative.filter
-    new = (
-        Filter.model_validate({"applies-to": "term", "ratio": ratio}) if filt is None else filt.model_copy(update={"ratio": ratio})
-    )
-    return e.model_copy(update={"derivative": e.derivative.model_copy(update={"filter": new})})
+    new: Filter[Reference] = Filter(applies_to="term", ratio=ratio) if filt is None else replace(filt, ratio=ratio)
+    return e.model_copy(update={"derivative": replace(e.derivative, filter=new)})
 
 
 def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], Equation], *, is_source: bool) -> str:

@@ -268,8 +268,8 @@ def _concluded(
 def _measurement_lag(source: Settings, request: Request) -> float | None:
     """Return the time of the source's filter on the measurement [s]: of a share per scan that which the decimals as typed make."""
     h = request.scan[0] if request.scan else None
-    lag = source.algorithm(scan=h).pv_filter
-    if lag is None or lag.factor == 1:
+    lag = source.algorithm(scan=h).measurement.filter
+    if lag is None or lag.factor is None:
         return None if lag is None else lag.time
     share = as_typed(lag.factor)
     return float(as_typed(default_scan(source.equation) if h is None else h) * (1 - share) / share)

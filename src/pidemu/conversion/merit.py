@@ -162,7 +162,7 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
         dials=dials_that_differ(source, settings, work.factor),
         rules=rules_differ(source, settings),
         assumed=_assumed(settings),
-        windup=a.windup != b.windup,
+        windup=a.integral.windup.scheme != b.integral.windup.scheme,
         noise=0 if exact else _noise_steps(ratio),
         derivative=not b.kd and settings.equation.derivative.on not in ("pv", "none"),
         rounding=_coarse(rounding_error(settings)),
@@ -184,7 +184,7 @@ def forgets(source: Settings, target: Settings) -> bool:
 
 def _holds_a_bias(settings: Settings) -> bool:
     a = settings.algorithm()
-    cleared = a.start == "load-output" and not a.keeps_integral and settings.by_role(Role.BIAS) is None
+    cleared = a.transfer.way.loads_output and a.transfer.without_integral != "kept" and settings.by_role(Role.BIAS) is None
     return not a.velocity and not cleared
 
 
@@ -207,9 +207,9 @@ def setpoint_class(source: Algorithm, target: Algorithm) -> int:
 def rules_differ(source: Settings, target: Settings) -> bool:
     """Whether two controllers compute what they have in common by different scan rules."""
     a, b = source.algorithm(), target.algorithm()
-    found = bool(a.ki and b.ki) and a.integral_rule is not b.integral_rule
+    found = bool(a.ki and b.ki) and a.integral.rule is not b.integral.rule
     filtered = (a.has_term_filter or a.has_signal_filter) and (b.has_term_filter or b.has_signal_filter)
-    return found or (bool(a.kd and b.kd) and filtered and a.derivative_rule is not b.derivative_rule)
+    return found or (bool(a.kd and b.kd) and filtered and a.derivative.rule is not b.derivative.rule)
 
 
 def dials_that_differ(source: Settings, target: Settings, factor: float) -> int:

@@ -305,7 +305,7 @@ class Solver:
 
     def _usable(self, Tf: float, a: Algorithm, scan: float | None) -> float:
         """Return a filter time [s] or, where its rule would ring or leave hardly a derivative, the nearest at which it does not."""
-        least = _LEAST.get(a.derivative_rule if a.filter_on == "term" else a.filter_rule, 0.0) * (scan or 0.0)
+        least = _LEAST.get(a.derivative.rule if a.filter_on == "term" else a.filter_rule, 0.0) * (scan or 0.0)
         if Tf >= least:
             return max(Tf, 0.0)
         f = self.target.filter

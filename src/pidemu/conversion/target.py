@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.base import Form, Rule
-from pidemu.card.model.card_file import Equation, Setting, default_scan, gain_sign
+from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
 from pidemu.settings.ranges import SignalRange
@@ -265,7 +265,7 @@ class Target:
     def shape(self) -> Algorithm:
         """The target's algorithm with placeholder numbers, for everything but its numbers."""
         found = self.template().algorithm()
-        return replace(found, pv_filter=None) if self.is_paired else found
+        return found.filtered(None) if self.is_paired else found
 
     def template(self, **extra: object) -> Settings:
         """Return settings with placeholder numbers in the dials that a conversion computes."""
@@ -326,7 +326,7 @@ class Target:
         rate = n.ki / (scale * engineering) if parallel else n.ki * per_gain
         time = n.kd / (scale * engineering) if parallel else n.kd * per_gain
         rate, time = rate * self.pace, time / self.pace
-        sign = gain_sign(self.variant.equation)  # a parallel form carries it on every gain, the others on one
+        sign = self.variant.equation.action.gain_sign  # a parallel form carries it on every gain, the others on one
         each = sign if parallel else 1.0
         wanted = [
             (Role.GAIN, sign * n.K / scale), (Role.INTEGRAL, each * rate), (Role.DERIVATIVE, each * time), (Role.MULTIPLIER, scale),

@@ -108,7 +108,7 @@ class Bench:
     @property
     def entry(self) -> float | None:
         """What is entered in manual for the output; ``None``: there is no manual, the controller computes and is not used."""
-        if self.a.start == "running":
+        if self.a.transfer.way.runs_on:
             return None
         return self.op / self.gain + 0.0 if self.gain else self.op
 
@@ -132,7 +132,7 @@ class Bench:
         """The unit of what the integral's state holds (specs/equations.md, section 6)."""
         given = "%" if self.settings.equation.signals == "percent" else self.out.unit
         other = "%" if self.settings.equation.signals == "percent" else self.measured.unit
-        return {"ki e": given, "e/Ti": other, "e": f"{other} s"}[self.a.holds]
+        return {"ki e": given, "e/Ti": other, "e": f"{other} s"}[self.a.integral.holds]
 
     def controller(self, bias: float | None) -> Controller:
         """Return the target before its first scan, with a bias [own output units] on the dial that it has, or behind the block.
@@ -199,7 +199,7 @@ def bench_for(
 
 def _gain_by_hand(bench: Bench) -> float:
     """Return what the operator's number is multiplied by in manual (section 6)."""
-    if bench.a.manual_output == "operator":
+    if bench.a.transfer.manual_output == "operator":
         return 1.0
     one = bench.controller(None).scan(bench.sp, bench.pv, auto=False, manual=1.0)
     return copysign(bench.a.kp, one) if one else 0.0

@@ -134,7 +134,7 @@ def _moved(settings: Settings, h: float, action: Action, step: float) -> _Move:
     still = controller.run(low, np.full(wait, low))[-1]  # P on PV without integral does not rest where it is put
     u = scale.output_percent(controller.run(low, np.full(wait + watched, after))) - scale.output_percent(np.array(still))
     ramp = float(u[-1] - u[wait - 1]) / watched if a.ki or a.dahlin else 0.0
-    scans = np.arange(u.size) + _SHARE.get(a.integral_rule, 1.0) - a.previous_pv
+    scans = np.arange(u.size) + _SHARE.get(a.integral.rule, 1.0) - a.measurement.previous_scan
     level = u - ramp * scans
     if not np.isfinite(level).all():
         raise ScanError("gain or derivative is so large that a step of PV takes the output beyond all numbers")

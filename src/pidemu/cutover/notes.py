@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pidemu.card.model.around import STARTS
 from pidemu.card.model.base import Evidence, Status
 from pidemu.cutover.bench import Bench
 from pidemu.cutover.trials import LONGEST, Cut, Way, is_none, resolution
@@ -25,13 +24,15 @@ def notes(bench: Bench, way: Way, cut: Cut) -> Iterator[str]:
         yield f"{_increment(bench, cut)}: that is control, not a bump"
     if way.sp != bench.sp:
         follows = (
-            "in manual its setpoint follows the measurement, and stays there" if bench.a.sp_tracks else "it starts at an error of 0"
+            "in manual its setpoint follows the measurement, and stays there"
+            if bench.a.setpoint.tracks
+            else "it starts at an error of 0"
         )
         yield f"{follows}; giving the setpoint back moves the output by {bench.out.percent(cut.kick):.6g} % of span in one scan"
     if cut.waited is None:
         yield f"its filters and differences have not settled after {LONGEST} scans; the bump is the one at that moment"
-    if bench.a.precision != "float64":
-        yield f"{bench.a.precision} arithmetic: {resolution(bench, cut):.2g} % of span is its rounding, not a bump"
+    if bench.a.arithmetic.type != "float64":
+        yield f"{bench.a.arithmetic.type} arithmetic: {resolution(bench, cut):.2g} % of span is its rounding, not a bump"
     ranges = (bench.settings.pv_range, bench.settings.op_range)
     if bench.settings.equation.signals == "engineering" and None in ranges:
         yield f"{card} computes in engineering units, and not all ranges were given: spans not given are taken as 100"
@@ -49,9 +50,13 @@ def _increment(bench: Bench, cut: Cut) -> str:
 def _what_starts(bench: Bench, way: Way, card: str) -> str:
     if bench.increments:
         return f"{card} adds increments to the last output, and makes none in the first automatic scan: there is nothing to preset"
-    if bench.is_bare and way.integral is None and (bench.a.start != "load-output" or not bench.a.keeps_integral):
+    if (
+        bench.is_bare
+        and way.integral is None
+        and (not bench.a.transfer.way.loads_output or bench.a.transfer.without_integral != "kept")
+    ):
         return f"{card} has no integral action here: its output is P, D and a bias, whatever it was before"
-    return f"at the transfer {card} {STARTS[bench.a.start]}"
+    return f"at the transfer {card} {bench.a.transfer.way.of_a_controller}"
 
 
 def _evidence(bench: Bench, path: str) -> Evidence | None:
@@ -88,8 +93,8 @@ def _preset(bench: Bench, way: Way, card: str) -> Iterator[str]:
 
 def _detour(bench: Bench, way: Way) -> bool:
     """Tell whether the setpoint is moved because the integral is loaded with the output."""
-    loads = bench.a.start == "load-output" and (bench.a.ki != 0 or bench.a.keeps_integral)
-    return loads and not bench.a.sp_tracks and way.sp != bench.sp
+    loads = bench.a.transfer.way.loads_output and (bench.a.ki != 0 or bench.a.transfer.without_integral == "kept")
+    return loads and not bench.a.setpoint.tracks and way.sp != bench.sp
 
 
 def _left(bench: Bench, cut: Cut, card: str) -> Iterator[str]:
@@ -97,7 +102,7 @@ def _left(bench: Bench, cut: Cut, card: str) -> Iterator[str]:
     if is_none(bench, cut):
         return
     bump = bench.out.percent(cut.bump)
-    if bench.is_bare and not bench.a.keeps_integral:
+    if bench.is_bare and bench.a.transfer.without_integral != "kept":
         yield f"a bump of {bump:.6g} % of span remains: without integral action {card} keeps nothing that would hold the output; " \
             f"a constant of {-bench.out.move(cut.bump):.6g} {bench.out.unit} added behind it would"  # fmt: skip
     else:

@@ -29,7 +29,7 @@ class Step:
 def steps(bench: Bench, way: Way, cut: Cut) -> Iterator[Step]:
     """Yield what to do, in order."""
     back = way.sp != bench.sp
-    if not bench.a.sp_tracks:
+    if not bench.a.setpoint.tracks:
         given = bench.measured.given(way.sp)
         why = ", the measurement" if back else ""
         yield Step(f"set the target's setpoint to {bench.measured.text(way.sp)}{why}", {f"SP [{bench.measured.unit}]": given})
@@ -59,7 +59,7 @@ def _wait(bench: Bench, way: Way, cut: Cut) -> Iterator[Step]:
     how = "let it compute so" if way.entry is None else "leave it so"
     if cut.waited is None:
         yield Step(f"{how} until its filters and differences have settled, more than {LONGEST * bench.scan:.6g} s", {})
-    elif cut.waited > 1 or bench.a.start == "tracked":
+    elif cut.waited > 1 or bench.a.transfer.way.tracks:
         why = "its integral follows the output" if cut.waited == 1 else "its filters and differences settle"
         count = f"{cut.waited} scan{'s' * (cut.waited > 1)}"
         yield Step(f"{how} for at least {cut.waited * bench.scan:.6g} s ({count}), in which {why}", {})
@@ -74,7 +74,7 @@ def _manual(bench: Bench, way: Way) -> Step:
         )
     if not bench.gain:
         return Step(f"hold the valve at {op} from outside, and switch the target off: its output is then 0", {})
-    if bench.a.manual_output == "gain-times-operator":
+    if bench.a.transfer.manual_output == "gain-times-operator":
         return Step(
             f"put the target in manual and enter {way.entry:.6g}: its output is that times {bench.gain:.6g}, its gain: {op}",
             {f"manual entry [{bench.out.unit}]": way.entry},
@@ -104,8 +104,10 @@ def _load(bench: Bench, load: float, cut: Cut) -> Step:
 
 def _integral(bench: Bench, integral: float, cut: Cut) -> Step:
     own = "% of span" if bench.out.rescaled else bench.out.unit
-    held = {"ki e": "", "e/Ti": ", divided by the gain", "e": ", divided by the gain and times the integral time"}[bench.a.holds]
-    after = "once it is on, and before its first scan, " if bench.a.start == "zero" else ""
+    held = {"ki e": "", "e/Ti": ", divided by the gain", "e": ", divided by the gain and times the integral time"}[
+        bench.a.integral.holds
+    ]
+    after = "once it is on, and before its first scan, " if bench.a.transfer.way.clears else ""
     return Step(
         f"{after}set its integral to {integral:.6g} {bench.unit}: the output of {bench.op:.6g} {own} less the proportional term of "
         f"{cut.proportional:.6g} {own}{held}; the derivative is 0 at rest",

@@ -92,8 +92,8 @@ def resolution(bench: Bench, cut: Cut) -> float:
     """Return the rounding of the arithmetic [% of output span] (specs/equations.md, section 7)."""
     a = bench.a
     size = abs(bench.op) + 2 * abs(cut.proportional) + abs(cut.increment)
-    part = {"float64": 1e-14, "float32": 2.0**-21, "integer": 0.0}[a.precision]  # some operations, half a bit each
-    step = a.resolution + (1 / a.counts if a.precision == "integer" else 0.0)
+    part = {"float64": 1e-14, "float32": 2.0**-21, "integer": 0.0}[a.arithmetic.type]  # some operations, half a bit each
+    step = (a.output.resolution or 0.0) + (1 / (a.arithmetic.counts or 1) if a.arithmetic.type == "integer" else 0.0)
     return max(NO_BUMP, bench.out.percent(part * size + step))
 
 
@@ -123,10 +123,10 @@ def before(bench: Bench, way: Way) -> tuple[Controller, int | None]:
 
 def factors(a: Algorithm, ctl: Controller) -> tuple[float, float]:
     """Return the gain on the sum of the terms, and the integral time that the integral's state is divided by (section 6)."""
-    if a.holds == "ki e":
+    if a.integral.holds == "ki e":
         return 1.0, 1.0
     numbers = dict(zip((q.name for q in ctl.program.coefficients), ctl.program.values, strict=True))
-    return numbers["kp"], numbers.get("Ti", 1.0) if a.holds == "e" else 1.0
+    return numbers["kp"], numbers.get("Ti", 1.0) if a.integral.holds == "e" else 1.0
 
 
 def term(ctl: Controller, bench: Bench, sp: float) -> float:
@@ -147,9 +147,9 @@ def proportional(ctl: Controller, bench: Bench, sp: float) -> float:
 def _preset(bench: Bench, state: Mapping[str, float], integral: float) -> dict[str, float]:
     """Return the states that go with an integral that is set: what the algorithm knows of its output is the output."""
     preset = {"I": integral} | {name: bench.op for name in ("own", "inner") if name in state}
-    if bench.a.start == "zero":  # set after the transfer has cleared it, and the derivative with it
+    if bench.a.transfer.way.clears:  # set after the transfer has cleared it, and the derivative with it
         preset |= {"on": 1.0}
-        if bench.a.derivative_start == "zeroed":
+        if bench.a.transfer.derivative == "zeroed":
             preset |= {name: 0.0 for name in ("x1", "x2", "x3", "D") if name in state}
     return preset
 
@@ -173,13 +173,17 @@ def _settle(ctl: Controller, sp: float, pv: float, entry: float) -> int | None:
 
 def _integrates_at_once(a: Algorithm, state: Mapping[str, float]) -> float:
     """Return the share of its increment that the integral adds in the first automatic scan (sections 4 and 6)."""
-    if a.velocity or not a.ki or a.start == "bumpless" or a.integral_rule is Rule.FORWARD:
+    if a.velocity or not a.ki or a.transfer.way.is_bumpless or a.integral.rule is Rule.FORWARD:
         return 0.0
     if state.get("begun", 1.0) == 0:  # the first scan of all
-        waits = a.first_scan_holds if a.zero_power_up or a.start == "load-output" else True
-        share = 0.5 if a.integral_from_zero and a.integral_rule is Rule.TRAPEZOIDAL else 1.0
+        waits = a.transfer.first_scan == "holds" if a.transfer.power_up == "zero" or a.transfer.way.loads_output else True
+        share = 0.5 if a.integral.starts == "zero" and a.integral.rule is Rule.TRAPEZOIDAL else 1.0
         return 0.0 if waits else share
-    return 0.0 if a.first_scan_holds and a.start not in ("running", "tracked") and not state.get("on") else 1.0
+    return (
+        0.0
+        if a.transfer.first_scan == "holds" and not (a.transfer.way.runs_on or a.transfer.way.tracks) and not state.get("on")
+        else 1.0
+    )
 
 
 def _increment(bench: Bench, way: Way) -> float:

@@ -33,18 +33,18 @@ def ways(bench: Bench) -> Iterator[Way]:
     An integral that the transfer does not set (`keep`, `zero`, `running`) is set by hand in every way, whether the card says how or
     not; one that is loaded with the output is given another number only where the card says that it can be.
     """
-    setpoints = (bench.pv,) if bench.a.sp_tracks else tuple(dict.fromkeys((bench.sp, bench.pv)))
+    setpoints = (bench.pv,) if bench.a.setpoint.tracks else tuple(dict.fromkeys((bench.sp, bench.pv)))
     for sp in setpoints:
         plain = Way(sp, bench.entry)
         ctl, _ = before(bench, plain)
-        if "I" in ctl.state and bench.a.start in ("keep", "zero", "running"):
+        if "I" in ctl.state and bench.a.transfer.way.can_preset:
             yield replace(plain, integral=_integral(bench, ctl, sp))
             continue
         yield plain
         left = bench.op - proportional(ctl, bench, sp)
-        if bench.a.start == "load-output" and "I" in ctl.state and bench.preset == "output":
+        if bench.a.transfer.way.loads_output and "I" in ctl.state and bench.preset == "output":
             yield replace(plain, load=left)
-        if bench.is_bare and bench.a.keeps_integral and "I" not in ctl.state and _fits(bench, left):
+        if bench.is_bare and bench.a.transfer.without_integral == "kept" and "I" not in ctl.state and _fits(bench, left):
             yield replace(plain, bias=left)
 
 

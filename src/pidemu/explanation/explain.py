@@ -114,9 +114,9 @@ def _filters(settings: Settings, a: Algorithm, forms: Forms | None) -> Iterator[
     if filt is not None and (a.has_term_filter or a.has_signal_filter):
         own = "standard" if filt.of == "effective-derivative" or not a.series else "series"
         yield FilterFacts(_filter_place(settings), a.Tf, _ratio(a, forms, own), a.filter_order)
-    for on, lag in (("measurement", a.pv_filter), ("error", a.e_filter), ("setpoint", a.sp_filter)):
+    for on, lag in (("measurement", a.measurement.filter), ("error", a.error.filter), ("setpoint", a.setpoint.filter)):
         if lag is not None:
-            yield FilterFacts(on, lag.time)
+            yield FilterFacts(on, lag.seconds)
 
 
 def _ratio(a: Algorithm, forms: Forms | None, own: str) -> float | None:

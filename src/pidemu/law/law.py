@@ -16,8 +16,9 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.algorithm.model import Algorithm, Dahlin, Lag, check_filters
+from pidemu.algorithm.model import Algorithm, Dahlin, check_filters
 from pidemu.card.model.base import Rule
+from pidemu.card.model.signals import SignalFilter
 from pidemu.errors import ScanError, UndefinedError
 from pidemu.law.power_series import hold, one_minus_delay
 from pidemu.law.rational import Rational, Response, add, multiply
@@ -40,7 +41,7 @@ class Operators:
     lag : callable
         From filter time [s] and order to ``1/(1 + Tf s)`` or ``1/(1 + Tf s + Tf^2 s^2/2)``.
     signal_lag : callable
-        The same from a `Lag`, the filter on a signal.
+        The same from a `SignalFilter`, the filter on a signal.
     delay : object
         One scan; 1 in the continuous law, which has none.
     pole_cancellation : callable
@@ -50,12 +51,12 @@ class Operators:
     integrator: Any
     differentiator: Callable[[Any], Any]
     lag: Callable[[Any, int], Any]
-    signal_lag: Callable[[Lag], Any]
+    signal_lag: Callable[[SignalFilter[Any]], Any]
     delay: Any
     pole_cancellation: Callable[[Dahlin], Any]
 
 
-def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
+def paths(a: Algorithm[Any], op: Operators) -> tuple[Any, Any]:
     """Return feedback and setpoint path of an algorithm (specs/equations.md, section 2).
 
     Parameters
@@ -94,14 +95,14 @@ def paths(a: Algorithm, op: Operators) -> tuple[Any, Any]:
 
 def _before_the_algorithm(a: Algorithm, op: Operators, feedback: Any, setpoint: Any) -> tuple[Any, Any]:
     """Return both paths with what is done to the signals first (specs/equations.md, sections 4 and 6)."""
-    if a.e_filter is not None:
-        lag = op.signal_lag(a.e_filter)
+    if a.error.filter is not None:
+        lag = op.signal_lag(a.error.filter)
         feedback, setpoint = feedback * lag, setpoint * lag
-    if a.sp_filter is not None:
-        setpoint = setpoint * op.signal_lag(a.sp_filter)
-    if a.pv_filter is not None:
-        feedback = feedback * op.signal_lag(a.pv_filter)
-    if a.previous_pv:
+    if a.setpoint.filter is not None:
+        setpoint = setpoint * op.signal_lag(a.setpoint.filter)
+    if a.measurement.filter is not None:
+        feedback = feedback * op.signal_lag(a.measurement.filter)
+    if a.measurement.previous_scan:
         feedback = feedback * op.delay
     return feedback, setpoint
 
@@ -117,7 +118,7 @@ CONTINUOUS: Final = Operators(
     integrator=Rational((1.0,), (0.0, 1.0)),
     differentiator=lambda Tf: Rational((0.0, 1.0), (1.0, Tf)),
     lag=lambda Tf, order: Rational((1.0,), (1.0, Tf, Tf * Tf / 2) if order == 2 else (1.0, Tf)),
-    signal_lag=lambda f: Rational((1.0,), (1.0, f.time)),
+    signal_lag=lambda f: Rational((1.0,), (1.0, f.seconds)),
     delay=1.0,
     pole_cancellation=_no_continuous_law,
 )
@@ -131,7 +132,7 @@ def at_frequencies(w: npt.ArrayLike) -> Operators:
         integrator=1 / s,
         differentiator=lambda Tf: s / (1 + Tf * s),
         lag=lambda Tf, order: 1 / (1 + Tf * s + (Tf * s) ** 2 / 2) if order == 2 else 1 / (1 + Tf * s),
-        signal_lag=lambda f: 1 / (1 + f.time * s),
+        signal_lag=lambda f: 1 / (1 + f.seconds * s),
         delay=1.0,
         pole_cancellation=_no_continuous_law,
     )
@@ -173,14 +174,14 @@ def _by_rules(a: Algorithm, h: float, rest: Any, pole_cancellation: Callable[[Da
         raise ValueError(_DERIVATIVE_ONLY.format(rule.value))
 
     def differentiator(Tf: float) -> Any:
-        if a.derivative_rule is Rule.FOUR_POINT:
+        if a.derivative.rule is Rule.FOUR_POINT:
             q = 1 - rest
             return rest * (3 + 4 * q + 3 * q * q) / (10 * h)
-        if Tf and a.derivative_rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
+        if Tf and a.derivative.rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
             keep, take = math.exp(-h / Tf), -math.expm1(-h / Tf)
-            gain = take / h if a.derivative_rule is Rule.EXACT else keep / Tf
+            gain = take / h if a.derivative.rule is Rule.EXACT else keep / Tf
             return gain * rest / (take + keep * rest)
-        s = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
+        s = s_of(a.derivative.rule if Tf else Rule.BACKWARD)
         return s / (1 + Tf * s)
 
     def lag(Tf: float, order: int) -> Any:
@@ -188,7 +189,7 @@ def _by_rules(a: Algorithm, h: float, rest: Any, pole_cancellation: Callable[[Da
         return 1 / (1 + Tf * s + (Tf * s) * (Tf * s) / 2) if order == 2 else 1 / (1 + Tf * s)
 
     return Operators(
-        integrator=1 / s_of(a.integral_rule),
+        integrator=1 / s_of(a.integral.rule),
         differentiator=differentiator,
         lag=lag,
         signal_lag=lambda f: 1 / (1 + f.at(h) * s_of(f.rule)),
@@ -218,16 +219,16 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
                 return (2.0, -2.0), (h, h)
         raise ValueError(_DERIVATIVE_ONLY.format(rule.value))
 
-    integral = s_of(a.integral_rule)
+    integral = s_of(a.integral.rule)
 
     def differentiator(Tf: float) -> Rational:
-        if a.derivative_rule is Rule.FOUR_POINT:
+        if a.derivative.rule is Rule.FOUR_POINT:
             return Rational((3.0, 1.0, -1.0, -3.0), (10 * h,))
-        if Tf and a.derivative_rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
+        if Tf and a.derivative.rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE):
             keep = math.exp(-h / Tf)
-            gain = -math.expm1(-h / Tf) / h if a.derivative_rule is Rule.EXACT else keep / Tf
+            gain = -math.expm1(-h / Tf) / h if a.derivative.rule is Rule.EXACT else keep / Tf
             return Rational((gain, -gain), (1.0, -keep))
-        top, bottom = s_of(a.derivative_rule if Tf else Rule.BACKWARD)
+        top, bottom = s_of(a.derivative.rule if Tf else Rule.BACKWARD)
         return Rational(top, add(bottom, multiply((Tf,), top)))
 
     def lag(Tf: float, order: int) -> Rational:
@@ -238,7 +239,7 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
         den = add(add(square, multiply((Tf,), multiply(top, bottom))), multiply((Tf * Tf / 2,), multiply(top, top)))
         return Rational(square, den)
 
-    def signal_lag(f: Lag) -> Rational:
+    def signal_lag(f: SignalFilter[Any]) -> Rational:
         top, bottom = s_of(f.rule)
         return Rational(bottom, add(bottom, multiply((f.at(h),), top)))
 

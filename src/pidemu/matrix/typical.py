@@ -10,7 +10,7 @@ from typing import Final
 
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.model.base import Form
-from pidemu.card.model.card_file import Equation, Setting, default_scan, gain_sign
+from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.conversion.target import is_computed
@@ -127,7 +127,7 @@ def _dials(variant: Variant, derivative: bool) -> tuple[dict[str, float], list[s
 
 def _terms(equation: Equation, derivative: bool) -> dict[Role, float]:
     """Return the dials of the three terms in canonical units, with the sign that makes the controller reverse acting."""
-    sign = gain_sign(equation)
+    sign = equation.action.gain_sign
     time = DERIVATIVE_TIME if derivative else 0.0
     if equation.form is Form.PARALLEL:
         gain = sign * GAIN

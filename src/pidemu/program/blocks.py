@@ -11,8 +11,9 @@ import operator
 from collections.abc import Sequence
 from typing import Final
 
-from pidemu.algorithm.model import Algorithm, Lag, Shape
+from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
+from pidemu.card.model.signals import ErrorShape, SignalFilter
 from pidemu.program.ir import Assign, Binary, Expr, Floor, Name, Operand, Program, Quantity, equal, expr, names_in, select
 
 TINY: Final = 1e-300
@@ -106,8 +107,8 @@ class Builder:
             states=tuple(q for q, _ in self._states.values()),
             initial=tuple(v for _, v in self._states.values()),
             body=tuple(self._body),
-            precision="float32" if a.precision == "float32" else "float64",
-            wide_literals=a.wide_literals,
+            precision="float32" if a.arithmetic.type == "float32" else "float64",
+            wide_literals=a.arithmetic.literals == "float64",
         )
 
 
@@ -138,12 +139,12 @@ def towards(x: Expr, last: Expr, reach: Expr | None, down: Expr | None) -> Expr:
     return x if reach is None else select(x > last + reach, last + reach, x)
 
 
-def signal_lag(b: Builder, x: Expr, afresh: Expr, f: Lag, h: float, what: str) -> Name:
+def signal_lag(b: Builder, x: Expr, afresh: Expr, f: SignalFilter[float], h: float, what: str) -> Name:
     """First-order filter on setpoint, measurement or error (section 4)."""
     return lag(b, x, afresh, f.at(h), h, f.rule, 1, what)
 
 
-def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
+def shaped(b: Builder, e: Expr, afresh: Expr, s: ErrorShape[float], what: str) -> Name:
     """Return an error as P and I use it (section 8).
 
     Parameters
@@ -154,21 +155,23 @@ def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
         The error.
     afresh : Expr
         Where true, there is no earlier error.
-    s : Shape
+    s : ErrorShape
         What to do to it.
     what : str
         Prefix of the names.
     """
     size = b.let(f"{what}_abs", magnitude(e), "size of the error")
-    if s.kind != "gap":
+    if s.shape != "gap":
         over = b.coefficient("over", s.over, "error at which the shaped one is the same", "%")
-        if s.kind == "squared":
+        if s.shape == "squared":
             return b.let(f"{what}_s", e * (size / over), "error squared, with its sign (section 8)")
-        linear = b.coefficient("linearity", s.linearity, "share of the linear gain", "-")
-        rest = b.coefficient("rest", 1 - s.linearity, "share of the gain that grows with the error", "-")
+        share = 1.0 if s.linearity is None else s.linearity
+        linear = b.coefficient("linearity", share, "share of the linear gain", "-")
+        rest = b.coefficient("rest", 1 - share, "share of the gain that grows with the error", "-")
         return b.let(f"{what}_s", e * (linear + rest * (size / over)), "gain linear in |e| (section 8)")
-    band = b.coefficient("band", s.band, "half width of the band", "%")
-    inside = size < band if s.open_edge else size <= band
+    width = s.band or 0.0
+    band = b.coefficient("band", width, "half width of the band", "%")
+    inside = size < band if s.edge == "outside" else size <= band
     if s.zero_crossing:
         crossed, e1 = (
             b.state(f"{what}_crossed", "the error has crossed zero within the band", "-"),
@@ -181,7 +184,7 @@ def shaped(b: Builder, e: Expr, afresh: Expr, s: Shape, what: str) -> Name:
         inside = crossed > 0.0
     less: Expr = e
     if s.subtracted:
-        cut = b.coefficient("cut", (1 - s.gain) * s.band, "what the band takes from the error outside it", "%")
+        cut = b.coefficient("cut", (1 - s.gain) * width, "what the band takes from the error outside it", "%")
         less = select(e < 0.0, e + cut, e - cut)
     within: Expr = b.coefficient("gap_gain", s.gain, "gain within the band", "-") * e if s.gain else expr(0.0)
     return b.let(f"{what}_s", select(inside, within, less), "deadband or gap (section 8)")
@@ -270,7 +273,7 @@ def derivative(b: Builder, x: Expr, afresh: Expr, a: Algorithm, gain: float, Tf:
     Tf, h : float
         Filter time and scan interval [s].
     """
-    history = 3 if a.derivative_rule is Rule.FOUR_POINT else 1
+    history = 3 if a.derivative.rule is Rule.FOUR_POINT else 1
     past = [
         b.state(f"x{n}", f"signal of the derivative {'at the last scan' if n == 1 else f'{n} scans ago'}")
         for n in range(1, history + 1)
@@ -279,26 +282,26 @@ def derivative(b: Builder, x: Expr, afresh: Expr, a: Algorithm, gain: float, Tf:
         b.let(state.id, _before(b, a, x, state, afresh), "no derivative of the step from nothing to the first sample")
     state = b.state("D", "derivative term")
     old = _term_before(a, state, afresh)
-    lagged = a.derivative_rule is Rule.LAGGED_DIFFERENCE
+    lagged = a.derivative.rule is Rule.LAGGED_DIFFERENCE
     if lagged:
         _lagged_difference(b, x, past[0], gain, Tf, h)
-    elif a.derivative_rule is Rule.FOUR_POINT:
+    elif a.derivative.rule is Rule.FOUR_POINT:
         g = b.coefficient("kd_10h", gain / (10 * h), "kd/(10 h)", "-")
         b.let("D", g * (3.0 * (x - past[2]) + past[0] - past[1]), "derivative, four-point difference (section 4)")
     elif not Tf:
         g = b.coefficient("kd_h", gain / h, "kd/h", "-")
         b.let("D", g * (x - past[0]), "derivative, backward difference (section 4)")
     else:
-        decay, strength = _decay(a.derivative_rule, gain, Tf, h)
+        decay, strength = _decay(a.derivative.rule, gain, Tf, h)
         share = b.coefficient("D_decay", decay, "decay of the filtered derivative per scan", "-")
         k = b.coefficient("D_gain", strength, "kd over the filter's time", "-")
-        b.let("D", share * old + k * (x - past[0]), f"derivative, Tf = {Tf:.6g} s, {a.derivative_rule.value} (section 4)")
+        b.let("D", share * old + k * (x - past[0]), f"derivative, Tf = {Tf:.6g} s, {a.derivative.rule.value} (section 4)")
         b.let("D", flushed(state, b.tiny), "no denormal numbers (section 7)")
     for n in reversed(range(not lagged, history)):
         b.let(past[n].id, past[n - 1], "shift the derivative's history")
     if not lagged:
         b.let("x1", x, "kept for the next scan")
-    if a.derivative_start == "preset":
+    if a.transfer.derivative == "preset":
         b.let("D", select(b.automatic, state, 0.0), "no derivative in manual")
         for place in past:
             b.let(place.id, select(b.automatic, place, x), "in manual the history is the present sample")
@@ -307,15 +310,15 @@ def derivative(b: Builder, x: Expr, afresh: Expr, a: Algorithm, gain: float, Tf:
 
 def _before(b: Builder, a: Algorithm, x: Expr, state: Name, afresh: Expr) -> Expr:
     """Return the derivative's last signal, as the start and the transfer make it (section 6)."""
-    if a.derivative_start == "zeroed":
+    if a.transfer.derivative == "zeroed":
         return select(equal(Name("on"), 0.0), 0.0, state)
-    if a.derivative_from_zero:
-        return select(b.fresh, 0.0, select(afresh, x, state) if a.derivative_start == "restarted" else state)
+    if a.derivative.starts == "zero":
+        return select(b.fresh, 0.0, select(afresh, x, state) if a.transfer.derivative == "restarted" else state)
     return select(afresh, x, state)
 
 
 def _term_before(a: Algorithm, state: Name, afresh: Expr) -> Expr:
-    return select(equal(Name("on"), 0.0), 0.0, state) if a.derivative_start == "zeroed" else select(afresh, 0.0, state)
+    return select(equal(Name("on"), 0.0), 0.0, state) if a.transfer.derivative == "zeroed" else select(afresh, 0.0, state)
 
 
 def _decay(rule: Rule, gain: float, Tf: float, h: float) -> tuple[float, float]:

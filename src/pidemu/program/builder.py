@@ -66,12 +66,12 @@ def build(
     _check(algorithm, scan, limits, bias, initial_output, signals)
     sign = 1.0 if action == "reverse" else -1.0
     a = replace(algorithm, kp=sign * algorithm.kp, ki=sign * algorithm.ki, kd=sign * algorithm.kd)
-    b = Builder(title, signals, sign, TINY_SINGLE if algorithm.precision == "float32" else TINY)
-    own_terms = replace(a, kp=0.0, kd=0.0) if a.precision == "integer" else a  # counts have terms of their own
+    b = Builder(title, signals, sign, TINY_SINGLE if algorithm.arithmetic.type == "float32" else TINY)
+    own_terms = replace(a, kp=0.0, kd=0.0) if a.arithmetic.type == "integer" else a  # counts have terms of their own
     common = terms(b, own_terms, scan, _representable(limits, a), initial_output)
     if a.dahlin is not None:
         dahlin(b, a, scan, sign, common)
-    elif a.precision == "integer":
+    elif a.arithmetic.type == "integer":
         integer(b, a, scan, common)
     elif a.velocity:
         velocity(b, a, scan, common)
@@ -82,7 +82,7 @@ def build(
 
 def _representable(limits: tuple[float, float], a: Algorithm) -> tuple[float, float]:
     """Return the limits as the program's numbers can hold them, never outside those given."""
-    if a.precision != "float32":
+    if a.arithmetic.type != "float32":
         return limits
     low, high = (np.float32(x) for x in limits)
     if float(low) < limits[0]:
@@ -93,7 +93,7 @@ def _representable(limits: tuple[float, float], a: Algorithm) -> tuple[float, fl
 
 
 def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, initial_output: float, signals: Sequence[str]) -> None:
-    if not (math.isfinite(h) and (h > 0 or (h == 0 and a.derivative_rule is Rule.LAGGED_DIFFERENCE))):
+    if not (math.isfinite(h) and (h > 0 or (h == 0 and a.derivative.rule is Rule.LAGGED_DIFFERENCE))):
         raise ScanError(f"scan interval {h:g} s is not a positive number")
     for name, value in (("bias", bias), ("initial output", initial_output)):
         if not math.isfinite(value):
@@ -103,8 +103,10 @@ def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, ini
         raise ScanError(f"output limits {low:g} to {high:g} are not a range; give low, then high")
     if bias and (a.ki or a.velocity):
         raise ScanError("a bias belongs to a positional controller without integral action; leave it out")
-    if a.windup == "external-reset" and a.integral_rule is Rule.TRAPEZOIDAL and a.ki:
-        raise ScanError("external-reset windup is defined for the backward and forward rules only")
+    windup = a.integral.windup
+    if a.ki and a.integral.rule not in windup.rules:
+        words = " and ".join(rule.value for rule in windup.rules)
+        raise ScanError(f"{windup.scheme} windup is defined for the {words} rules only")
     for name in signals:
         if name not in EXTRA_INPUTS:
             raise ScanError(f"there is no signal '{name}'; signals: {', '.join(EXTRA_INPUTS)}")

@@ -38,12 +38,13 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     ScanError
         The algorithm is not of this kind, or the scan interval is not a whole number of ticks.
     """
-    if not a.velocity or a.series or a.c != 0 or a.b != 1 or a.integral_rule is not Rule.BACKWARD or a.shape is not None:
+    if not a.velocity or a.series or a.c != 0 or a.b != 1 or a.integral.rule is not Rule.BACKWARD or a.is_shaped:
         raise ScanError("integer arithmetic is defined for velocity PID in standard form, P on error and D on the measurement")
     manual = output.by_hand(b, a, t.u)
-    counts = b.coefficient("counts", float(a.counts), "counts per percent", "1/%")
-    fine = b.coefficient("fine", float(a.gain_counts), "parts of a count that the output sum is kept in", "-")
-    kp = b.coefficient("kp_counts", _whole(a.kp * a.gain_counts, "gain"), "gain in counts, signed for action", "-")
+    fine_counts = a.arithmetic.gain_counts or 1
+    counts = b.coefficient("counts", float(a.arithmetic.counts or 1), "counts per percent", "1/%")
+    fine = b.coefficient("fine", float(fine_counts), "parts of a count that the output sum is kept in", "-")
+    kp = b.coefficient("kp_counts", _whole(a.kp * fine_counts, "gain"), "gain in counts, signed for action", "-")
     y = b.let("y_c", _whole_counts(t.signals.y, counts), "measurement in counts", "-")
     e = b.let("e_c", _whole_counts(t.signals.r, counts) - y, "error in counts", "-")
     parts: list[Expr] = [_proportional(b, e, t)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from pidemu.algorithm.model import Algorithm
 from pidemu.program import blocks
 from pidemu.program.blocks import Builder
@@ -22,7 +20,7 @@ def feedforward(b: Builder, a: Algorithm) -> Expr | None:
     """Return the feedforward term, where the program reads that signal (section 6)."""
     if a.feedforward is None or not b.has("feedforward"):
         return None
-    gain = b.coefficient("kff", a.feedforward, "feedforward gain", "%/%")
+    gain = b.coefficient("kff", a.feedforward.gain, "feedforward gain", "%/%")
     return b.let("FF", gain * Name("feedforward"), "feedforward")
 
 
@@ -50,8 +48,8 @@ def within_limits(b: Builder, a: Algorithm, h: float, t: Terms, v: Expr, last: E
     if after is not None:
         total = b.let("out", out + after, "feedforward on the limited output (section 6)")
         out = b.let("out", blocks.limited(total, t.low, t.high), "output limits (section 5)")
-    if math.isfinite(a.output_rate):
-        reach = b.coefficient("u_reach", a.output_rate * h, "fastest change of the output in one scan", "%")
+    if a.output.rate is not None:
+        reach = b.coefficient("u_reach", a.output.rate * h, "fastest change of the output in one scan", "%")
         out = b.let("out", blocks.towards(out, last, reach, reach), "output rate limit (section 8)")
         out = b.let("out", blocks.limited(out, t.low, t.high), "the operator may have been beyond the limits")
     return out
@@ -59,22 +57,22 @@ def within_limits(b: Builder, a: Algorithm, h: float, t: Terms, v: Expr, last: E
 
 def stepped(b: Builder, a: Algorithm, t: Terms, out: Expr) -> Expr:
     """Return the output behind deadband and resolution: what the rest of the controller does not see (sections 7 and 8)."""
-    if a.output_deadband:
-        width = b.coefficient("u_band", a.output_deadband, "output deadband", "%")
+    if a.output.deadband:
+        width = b.coefficient("u_band", a.output.deadband, "output deadband", "%")
         out = b.let(
             "out_d",
             select(blocks.magnitude(out - t.u) > width, out, blocks.limited(t.u, t.low, t.high)),
             "output deadband (section 8)",
         )
-    if a.resolution:
-        step = b.coefficient("u_step", a.resolution, "output resolution", "%")
+    if a.output.resolution:
+        step = b.coefficient("u_step", a.output.resolution, "output resolution", "%")
         out = b.let("out_s", blocks.limited(blocks.rounded(out, step), t.low, t.high), "output resolution (section 7)")
     return out
 
 
 def kept(b: Builder, a: Algorithm, u: Name) -> Name:
     """Return the last output as the algorithm knows it: its own, where the real one is rounded or not used in manual."""
-    if a.start == "running" or a.output_deadband or a.resolution:
+    if a.transfer.way.runs_on or a.output.deadband or a.output.resolution:
         own = b.state("own", "last output as the algorithm knows it")
         b.let("own", select(b.fresh, u, own), "start at the initial output")
         return own
@@ -99,10 +97,10 @@ def of_sum(b: Builder, a: Algorithm, h: float, t: Terms, v: Expr, last: Name, ma
 
 def by_hand(b: Builder, a: Algorithm, u: Expr) -> Expr:
     """Return the output of this scan if it is not an automatic one (section 6)."""
-    if a.manual_output == "zero":
+    if a.transfer.manual_output == "zero":
         manual: Expr = b.let("man", 0.0, "no output in manual (section 6)")
-    elif a.manual_output == "gain-times-operator":
-        gain = b.coefficient("kp_manual", a.gain_sign * a.kp, "gain on the operator's output", "-")
+    elif a.transfer.manual_output == "gain-times-operator":
+        gain = b.coefficient("kp_manual", a.action.gain_sign * a.kp, "gain on the operator's output", "-")
         given = Name("manual")
         manual = b.let("man", select(equal(given, given), gain * given, u), "the operator's output times the gain (section 6)")
     else:

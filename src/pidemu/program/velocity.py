@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from pidemu.algorithm.model import Algorithm, Shape
+from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
 from pidemu.errors import ScanError
 from pidemu.program import blocks, output
 from pidemu.program.blocks import Builder
-from pidemu.program.ir import Expr, Name, equal, select
+from pidemu.program.ir import Expr, select
 from pidemu.program.terms import Terms
+from pidemu.program.windup import windup_hooks
 
 
 def velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
@@ -32,9 +33,7 @@ def velocity(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
     moved = blocks.summed(parts) if parts else 0.0
     du: Expr = b.let("du", select(t.on, moved, 0.0), "increment; none at a transfer, bumpless (section 6)")
     du = output.lagged(b, a, h, du, "du")
-    base: Expr = last
-    if a.reads_back and b.has("reset"):
-        base = b.let("base", select(equal(Name("reset"), Name("reset")), Name("reset"), last), "output read back (section 5)")
+    base = windup_hooks(a.integral.windup).velocity_base(b, last)
     v = b.let("v", base + du, "last output and increment")
     output.of_sum(b, a, h, t, v, last, manual)
 
@@ -61,17 +60,17 @@ def _of_the_mode(b: Builder, a: Algorithm, t: Terms, in_cascade: float) -> Expr:
         other = b.coefficient("b_cascade", in_cascade, "setpoint weight in cascade", "-")
         weight = b.let("b_now", select(s.cascade, other, weight), "setpoint weight in this mode", "-")
     kp = b.coefficient("kp", a.kp, "proportional gain, signed for action", "%/%")
-    if a.shape is None:
+    if not a.is_shaped:
         change: Expr = weight * (s.r - r1) - (s.y - y1)
     else:
-        change = _shaped(b, a.shape, t, weight * s.r - s.y, "x_now") - _shaped(b, a.shape, t, weight * r1 - y1, "x_was")
+        change = _shaped(b, a, t, weight * s.r - s.y, "x_now") - _shaped(b, a, t, weight * r1 - y1, "x_was")
     moved = b.let("dP", kp * change, "increment of the proportional term, structure of the mode (section 6)")
     b.let("r_last", s.r, "kept for the next scan")
     b.let("y_last", s.y, "kept for the next scan")
     return moved
 
 
-def _shaped(b: Builder, shape: Shape, t: Terms, x: Expr, name: str) -> Expr:
+def _shaped(b: Builder, a: Algorithm, t: Terms, x: Expr, name: str) -> Expr:
     """Return a signal of P as the mode shapes it.
 
     Raises
@@ -79,23 +78,23 @@ def _shaped(b: Builder, shape: Shape, t: Terms, x: Expr, name: str) -> Expr:
     ScanError
         The shape remembers a crossing of zero, which a change of structure has no meaning for.
     """
-    if shape.zero_crossing:
+    if a.error.zero_crossing:
         raise ScanError("a zero-crossing gap is not defined for increments whose structure depends on the mode")
     plain = b.let(name, x, "signal of P")
-    shaped = blocks.shaped(b, plain, t.fresh, shape, f"e_{name}")
-    here = shaped if shape.on_proportional else plain
-    if t.signals.cascade is None or shape.on_proportional == shape.on_cascade:
+    shaped = blocks.shaped(b, plain, t.fresh, a.error, f"e_{name}")
+    here = shaped if a.shapes_proportional else plain
+    if t.signals.cascade is None or a.shapes_proportional == a.shapes_in_cascade:
         return here
-    return select(t.signals.cascade, shaped if shape.on_cascade else plain, here)
+    return select(t.signals.cascade, shaped if a.shapes_in_cascade else plain, here)
 
 
 def _integral(b: Builder, a: Algorithm, h: float, t: Terms) -> Expr:
     """Return the increment of the integral (section 4)."""
-    grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral_rule, from_zero=a.integral_from_zero)
-    if a.integral_deadband is not None:
-        band = b.coefficient("i_band", a.integral_deadband, "integral deadband", "%")
+    grown = blocks.increment(b, t.w, t.fresh, a.ki, h, a.integral.rule, from_zero=a.integral.starts == "zero")
+    if a.integral.deadband is not None:
+        band = b.coefficient("i_band", a.integral.deadband, "integral deadband", "%")
         grown = b.let("dI", select(blocks.magnitude(t.signals.e) <= band, 0.0, grown), "integral deadband (section 8)")
-    if a.integral_rule is not Rule.FORWARD:
+    if a.integral.rule is not Rule.FORWARD:
         return grown
     late = b.state("dI1", "increment of the integral of the last scan")
     moved = b.let("dI", late, "increment of the integral, one scan late: forward (section 4)")

@@ -156,7 +156,7 @@ def controller_for(
     """
     scale, a = Scale(settings), settings.algorithm()
     start = scale.output_own(initial_output)
-    biased = not (a.ki or a.velocity or a.dahlin or a.start == "load-output" or a.bias) and start != 0
+    biased = not (a.ki or a.velocity or a.dahlin or a.transfer.way.loads_output or a.bias) and start != 0
     own = (scale.output_own(limits[0]), scale.output_own(limits[1]))
     controller = Controller(settings, timing.scan, action, own, bias=start if biased else 0.0, initial_output=start)
     return controller, biased

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.card_file import Equation, Setting
+from pidemu.card.model.signals import SignalFilter
 from pidemu.errors import ScanError
 from pidemu.plausible import INTERVAL, plausible
 from pidemu.settings.ranges import PERCENT, SignalRange
@@ -246,7 +247,6 @@ class Settings(Mapping[str, Value]):
         SettingError
             The settings do not make a controller: no gain to divide by, a filter of zero derivative gain.
         """
-        from pidemu.algorithm.model import Lag
         from pidemu.algorithm.resolve import algorithm_of  # numbers are made from settings, not settings from numbers
 
         equation = self.equation
@@ -257,7 +257,9 @@ class Settings(Mapping[str, Value]):
         if key not in self._algorithms:
             declared = self.scan if real is None else real / self.pace
             found = algorithm_of(self, own_units=own_units, scan=declared).paced(self.pace)
-            self._algorithms[key] = replace(found, pv_filter=Lag(self.lag)) if self.lag and found.pv_filter is None else found
+            self._algorithms[key] = (
+                found.filtered(SignalFilter(time=self.lag)) if self.lag and found.measurement.filter is None else found
+            )
         return self._algorithms[key]
 
     def to_dict(self) -> dict[str, Any]:
@@ -274,8 +276,8 @@ class Settings(Mapping[str, Value]):
         """Return why the card has no use for signals, by signal: ``"external_reset"`` and ``"feedforward"`` need a place to go."""
         a = self.algorithm()
         reasons = {}
-        if "external_reset" in signals and a.windup != "external-reset" and not a.reads_back:
-            reasons["external_reset"] = f"{self.card.id} takes no external reset: its windup scheme is '{a.windup}'"
+        if "external_reset" in signals and not a.integral.windup.takes_external_reset:
+            reasons["external_reset"] = f"{self.card.id} takes no external reset: its windup scheme is '{a.integral.windup.scheme}'"
         if "feedforward" in signals and a.feedforward is None:
             reasons["feedforward"] = f"{self.card.id} states no feedforward input"
         return reasons

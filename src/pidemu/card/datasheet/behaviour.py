@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 from pidemu.card.datasheet.at_limits import Row
-from pidemu.card.datasheet.legend import filter_at_work, short
-from pidemu.card.model.around import Faults
-from pidemu.card.model.base import Form, Rule
+from pidemu.card.datasheet.legend import filter_at_work
+from pidemu.card.model.base import Form, Reference, Rule, short
 from pidemu.card.model.card_file import Equation
 from pidemu.card.model.integral import Integral
+from pidemu.card.model.operation import Faults
 from pidemu.card.model.terms import Derivative
 
 _HOLDS: Final = {
@@ -62,7 +62,7 @@ def mode_rows(q: Equation) -> list[Row]:
     return rows
 
 
-def _integral(i: Integral) -> str:
+def _integral(i: Integral[Reference]) -> str:
     if i.on == "none":
         return "none"
     words = {
@@ -74,7 +74,7 @@ def _integral(i: Integral) -> str:
     return words[i.rule] + _HOLDS[i.holds] + still
 
 
-def _derivative(d: Derivative) -> str:
+def _derivative(d: Derivative[Reference]) -> str:
     if d.on == "none":
         return "none"
     filtered = d.filter is not None and d.filter.applies_to in ("term", "lead-lag")
@@ -87,7 +87,7 @@ def _derivative(d: Derivative) -> str:
     return f"{d.rule.value}, filtered" + ("; unfiltered where Tf is 0" if _may_be_off(d) else "")
 
 
-def _may_be_off(d: Derivative) -> bool:
+def _may_be_off(d: Derivative[Reference]) -> bool:
     return d.filter is not None and isinstance(d.filter.time, str)
 
 
@@ -153,12 +153,7 @@ def _meanwhile(q: Equation) -> str:
     if q.implementation == "velocity" or q.integral.on == "none":
         integral = ""
     else:
-        integral = {
-            "tracked": "; the integral follows it",
-            "zero": "; the integral is 0",
-            "keep": "; the integral stands still",
-            "running": "; the algorithm runs on, unused",
-        }.get(t.start, "")
+        integral = t.way.in_manual
     if q.derivative.on == "none":
         return integral
     return integral + ("; D is 0 and starts from the present signal" if t.derivative == "preset" else "")
@@ -168,21 +163,14 @@ def _start(q: Equation) -> str:
     t = q.transfer
     if q.implementation == "velocity":
         words = "bumpless: the first scan makes no increment"
-    elif q.integral.on == "none" and t.start != "load-output":
+    elif q.integral.on == "none" and not t.way.loads_output:
         words = "nothing is prepared: without integral the output is what P and D make it"
     else:
         loaded = "as it is" if t.loaded == "as-it-is" else "limited"
-        words = {
-            "bumpless": "bumpless: the integral is set to what the last output leaves for it",
-            "load-output": f"the integral is loaded with the last output, {loaded}, and the terms come on top: a bump",
-            "tracked": "the integral goes on from where it followed the output",
-            "keep": "the integral goes on from where it stood: a bump",
-            "zero": "the integral starts at zero: a bump",
-            "running": "the algorithm takes over as it ran: a bump",
-        }[t.start]
-        if t.start == "load-output" and t.without_integral == "zero":
+        words = t.way.at_the_transfer.format(loaded=loaded)
+        if t.way.loads_output and t.without_integral == "zero":
             words += "; without integral action nothing is loaded"
-        if t.first_scan == "holds" and t.start != "running":
+        if t.first_scan == "holds" and not t.way.runs_on:
             words += "; the integral does not grow in the first scan"
     if q.derivative.on == "none" or q.form is Form.DAHLIN:
         return words

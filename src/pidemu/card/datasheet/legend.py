@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from pidemu.card.model.base import Form
+from pidemu.card.model.base import Form, Given, Reference, short
 from pidemu.card.model.card_file import Equation
-from pidemu.card.model.terms import ErrorShape, Filter, SignalFilter
+from pidemu.card.model.signals import ErrorShape, SignalFilter
+from pidemu.card.model.terms import Filter
 from pidemu.errors import UnitError
 from pidemu.units import Dimension, parse_unit
 
 _TIMES: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
-
-Given = str | float | None
-"""A number, or the name of the setting that holds it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +57,7 @@ class Signals:
         return f"{sp} - {self.pv}" if sp else f"-{self.pv}"
 
 
-def filter_at_work(q: Equation) -> Filter | None:
+def filter_at_work(q: Equation) -> Filter[Reference] | None:
     """Return the filter that goes with the derivative, unless there is no derivative that it could act on or be a part of."""
     filt = q.derivative.filter
     if filt is None or q.derivative.on != "none":
@@ -123,7 +121,7 @@ def _error(q: Equation) -> Iterator[str]:
         yield _shape(q, q.error)
 
 
-def _lag_time(q: Equation, symbol: str, filt: SignalFilter) -> Iterator[str]:
+def _lag_time(q: Equation, symbol: str, filt: SignalFilter[Reference]) -> Iterator[str]:
     if filt.factor is not None:
         k = short(filt.factor)
         yield f"{symbol} = h (1 - {k})/{k}   h: scan interval; each scan takes the share {k} of the new sample"
@@ -131,7 +129,7 @@ def _lag_time(q: Equation, symbol: str, filt: SignalFilter) -> Iterator[str]:
         yield _time(q, symbol, filt.time)
 
 
-def _shape(q: Equation, e: ErrorShape) -> str:
+def _shape(q: Equation, e: ErrorShape[Reference]) -> str:
     """Return the shape of the error as a formula (specs/equations.md, section 8)."""
     if e.shape == "squared":
         return f"S(x) = x |x|/{e.over:g}"
@@ -156,7 +154,7 @@ def _derivative_filter(q: Equation) -> Iterator[str]:
         yield f"Tf = {_of_derivative(q, filt)}"
 
 
-def _of_derivative(q: Equation, filt: Filter) -> str:
+def _of_derivative(q: Equation, filt: Filter[Reference]) -> str:
     time = "Td"
     if filt.of == "effective-derivative":
         time = "Ti Td/(Ti + Td)" if q.integral.on != "none" else "Td"
@@ -248,11 +246,6 @@ def _is(symbol: str, value: str, dial: str = "", unit: str = "1") -> str:
 def named(q: Equation, given: Given) -> str:
     """Return a number, or a dial with its unit."""
     return f"{given} [{q.settings[given].unit}]" if isinstance(given, str) and given in q.settings else short(given)
-
-
-def short(given: Given) -> str:
-    """Return a number, or the name of a dial."""
-    return given if isinstance(given, str) else "-" if given is None else f"{given:g}"
 
 
 def _dimension(unit: str) -> Dimension | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pidemu.card.datasheet.legend import Signals, filter_at_work, legend
 from pidemu.card.load import Variant
-from pidemu.card.model.base import Form
+from pidemu.card.model.base import Form, Reference
 from pidemu.card.model.card_file import Equation
 from pidemu.card.model.terms import Proportional
 
@@ -44,7 +44,7 @@ def equation_lines(variant: Variant) -> list[str]:
     return [*lines, *_series_lines(q), *legend(q)]
 
 
-def another_structure(q: Equation) -> Proportional | None:
+def another_structure(q: Equation) -> Proportional[Reference] | None:
     """Return the proportional term in cascade, where it acts on something else than in automatic."""
     if q.cascade is None:
         return None
@@ -52,7 +52,7 @@ def another_structure(q: Equation) -> Proportional | None:
     return None if (other.on, other.weight) == (q.proportional.on, q.proportional.weight) else other
 
 
-def _sum(q: Equation, proportional: Proportional, weight: str) -> str:
+def _sum(q: Equation, proportional: Proportional[Reference], weight: str) -> str:
     s, parallel = Signals.of(q), q.form is Form.PARALLEL
     parts = _factored(q, proportional, s, weight) if _as_a_lead(q) else _terms(q, proportional, s, weight)
     total = " + ".join(parts) or "0"
@@ -80,7 +80,7 @@ def _as_a_lead(q: Equation) -> bool:
     return _is_series(q) and q.error is None and not q.action.fixed
 
 
-def _terms(q: Equation, proportional: Proportional, s: Signals, weight: str) -> list[str]:
+def _terms(q: Equation, proportional: Proportional[Reference], s: Signals, weight: str) -> list[str]:
     parallel, series = q.form is Form.PARALLEL, _is_series(q)
     parts = []
     if proportional.on != "none":
@@ -113,7 +113,7 @@ def _derivative(q: Equation) -> str:
     return "s/(1 + Tf s)" if filt is not None and filt.applies_to in ("term", "lead-lag") else "s"
 
 
-def _factored(q: Equation, proportional: Proportional, s: Signals, weight: str) -> list[str]:
+def _factored(q: Equation, proportional: Proportional[Reference], s: Signals, weight: str) -> list[str]:
     """Return the terms of the series form with the derivative as a lead L on the signals.
 
     With ``Dx = (L - 1)(c SP - PV)`` and ``Lc = 1 + c (L - 1)``, P and Dx are together ``(b + Lc - 1) SP - L PV``.

@@ -6,7 +6,7 @@ import math
 import re
 from datetime import date
 from enum import StrEnum
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -16,7 +16,8 @@ LARGEST: Final = 1e40
 """Sizes between which finite numbers of cards lie, other than 0: those of float32 do, and all of engineering."""
 
 
-def _hyphen(name: str) -> str:
+def hyphenated(name: str) -> str:
+    """Return the key of a card that a field's name in Python stands for."""
     return name.rstrip("_").replace("_", "-")
 
 
@@ -44,17 +45,40 @@ def _line(value: str) -> str:
     return value
 
 
-class Model(BaseModel):
-    """Base of every part of a card: frozen, and nothing but the documented keys."""
+_CONFIG: Final = ConfigDict(
+    extra="forbid",
+    frozen=True,
+    alias_generator=hyphenated,
+    populate_by_name=False,
+    str_strip_whitespace=True,
+    defer_build=True,  # parts are built within the whole; by themselves only where they are used
+)
 
-    model_config = ConfigDict(
-        extra="forbid",
-        frozen=True,
-        alias_generator=_hyphen,
-        populate_by_name=False,
-        str_strip_whitespace=True,
-        defer_build=True,  # parts are built within the whole; by themselves only where they are used
-    )
+
+class Model(BaseModel):
+    """Base of what only a card has: frozen, and nothing but the documented keys."""
+
+    model_config = _CONFIG
+
+
+class Part:
+    """Base of what a card and the algorithm that is made of it have alike: frozen dataclasses, and nothing but the documented keys.
+
+    Where a card has a number or the name of a setting, the algorithm has the number: such a part is generic over `R`, and is
+    ``Setpoint[Reference]`` in a card, ``Setpoint[float]`` in an algorithm.
+    """
+
+    __slots__ = ()
+    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+
+
+R = TypeVar("R")
+"""What stands for a number: in a card a `Reference`, in an algorithm a number."""
+
+
+def means(text: str) -> Any:
+    """Return what describes a field of a part: the reference of the language is made of it."""
+    return Field(description=text)
 
 
 Text = Annotated[str, Field(min_length=1, max_length=10_000)]
@@ -159,3 +183,12 @@ class Evidence(Model):
 
 Reference = SettingName | Number
 """A number, or the name of the setting that holds it."""
+
+
+Given = str | float | None
+"""A number, the name of the setting that holds it, or nothing."""
+
+
+def short(given: Given) -> str:
+    """Return a number, or the name of a dial, as a data sheet has it."""
+    return given if isinstance(given, str) else "-" if given is None else f"{given:g}"

@@ -1,7 +1,7 @@
 """The card language, version 1: what a card may say.
 
 Every field's description is its reference: ``specs/card-language.md`` and ``specs/card.schema.json`` are generated from here and
-from the modules that this one puts together: ``base``, ``terms``, ``integral`` and ``stages``.
+from the modules that this one puts together: those beside it, and the windup schemes and transfers.
 """
 
 from __future__ import annotations
@@ -10,10 +10,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pidemu.card.model.around import Action, Arithmetic, Faults, Output, Scan, Transfer
-from pidemu.card.model.base import Evidence, Form, Model, Name, Number, SettingName, Size, Source, Text
+from pidemu.card.model.base import Evidence, Form, Model, Name, Number, Reference, SettingName, Size, Source, Text
 from pidemu.card.model.integral import Integral
-from pidemu.card.model.terms import Cascade, Derivative, ErrorShape, Feedforward, Measurement, Proportional, Setpoint
+from pidemu.card.model.marks import PerScan
+from pidemu.card.model.operation import Action, Arithmetic, Faults, Output, Scan
+from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint
+from pidemu.card.model.terms import Cascade, Derivative, Feedforward, Proportional
+from pidemu.card.transfer import Transfer
 from pidemu.units import Role, parse_quantity, to_canonical
 
 
@@ -114,30 +117,34 @@ class Equation(Model):
         "`K (1 + 1/(Ti s)) (1 + Td s)`. `dahlin`: pole cancellation, `D(z)` of a first-order process with dead time "
         "(specs/equations.md, section 4)."
     )
-    implementation: Literal["positional", "velocity"] = Field(
+    implementation: Annotated[Literal["positional", "velocity"], PerScan()] = Field(
         description="`positional`: the output is the sum of the terms. `velocity`: their increments are added to the last limited "
         "output."
     )
-    setpoint: Setpoint | None = Field(
+    setpoint: Setpoint[Reference] | None = Field(
         default=None, description="What is done to the setpoint before the algorithm; nothing if absent."
     )
-    measurement: Measurement | None = Field(
+    measurement: Measurement[Reference] | None = Field(
         default=None, description="What is done to the measurement before it; nothing if absent."
     )
-    error: ErrorShape | None = Field(default=None, description="What is done to the error; nothing if absent.")
-    proportional: Proportional = Field(description="The proportional term.")
-    cascade: Cascade | None = Field(
+    error: ErrorShape[Reference] | None = Field(default=None, description="What is done to the error; nothing if absent.")
+    proportional: Proportional[Reference] = Field(description="The proportional term.")
+    cascade: Annotated[Cascade[Reference] | None, PerScan()] = Field(
         default=None, description="What is different in cascade, with a remote setpoint; nothing if absent."
     )
-    integral: Integral = Field(description="The integral term.")
-    derivative: Derivative = Field(description="The derivative term.")
-    feedforward: Feedforward | None = Field(default=None, description="Feedforward input; none if absent.")
-    transfer: Transfer = Field(description="What happens when the controller is put into automatic.")
-    action: Action = Field(description="Control action.")
-    scan: Scan = Field(description="Scan interval.")
-    output: Output = Field(description="Output.")
-    arithmetic: Arithmetic | None = Field(default=None, description="How numbers are computed; float64 if absent.")
-    faults: Faults | None = Field(
+    integral: Integral[Reference] = Field(description="The integral term.")
+    derivative: Derivative[Reference] = Field(description="The derivative term.")
+    feedforward: Annotated[Feedforward[Reference] | None, PerScan()] = Field(
+        default=None, description="Feedforward input; none if absent."
+    )
+    transfer: Annotated[Transfer, PerScan()] = Field(description="What happens when the controller is put into automatic.")
+    action: Annotated[Action, PerScan()] = Field(description="Control action.")
+    scan: Annotated[Scan, PerScan()] = Field(description="Scan interval.")
+    output: Annotated[Output[Reference], PerScan()] = Field(description="Output.")
+    arithmetic: Annotated[Arithmetic | None, PerScan()] = Field(
+        default=None, description="How numbers are computed; float64 if absent."
+    )
+    faults: Annotated[Faults | None, PerScan()] = Field(
         default=None,
         description="What signals that are not numbers and scan intervals of zero or less do; nothing is computed "
         "and the output stands, if absent.",
@@ -149,11 +156,6 @@ def default_scan(equation: Equation) -> float:
     """Return the card's scan interval [s]."""
     number, unit = parse_quantity(equation.scan.default)
     return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
-
-
-def gain_sign(equation: Equation) -> float:
-    """Return -1 where a positive gain is direct acting (`action.fixed` with ``pv - sp``), else 1."""
-    return -1.0 if equation.action.fixed and equation.action.reverse == "pv - sp" else 1.0
 
 
 class CardFile(Equation):

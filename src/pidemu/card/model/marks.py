@@ -1,0 +1,157 @@
+"""What a field of the card language says of itself, besides its type and its meaning; and walks over cards that look for it.
+
+Whoever needs "all fields that the linear law leaves out" asks for the fields with that mark. There is no list beside the language
+that has to agree with it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """The field holds a number, or names the setting that holds it.
+
+    Attributes
+    ----------
+    sets : str
+        What that setting has to set.
+    words : tuple of str
+        Words that may stand there, and are no setting's name.
+    """
+
+    sets: str
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Beyond:
+    """The linear law leaves the field out (specs/equations.md, section 9).
+
+    Attributes
+    ----------
+    neutral : object
+        Its value where it does nothing.
+    words : callable, optional
+        From the part of the card that has the field to what is at work there; ``None`` where nothing is.
+    """
+
+    neutral: Any
+    words: Callable[[Any], str | None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """The field decides about the first scan or a transfer.
+
+    Attributes
+    ----------
+    neutral : object
+        The value with which neither moves anything.
+    """
+
+    neutral: Any
+
+
+@dataclass(frozen=True, slots=True)
+class PerScan:
+    """The field says how the law is computed scan by scan, or what happens at limits and transfers: the law is the same without."""
+
+
+Mark = TypeVar("Mark", Names, Beyond, AtRest, PerScan)
+Tree = TypeVar("Tree")
+_fields: dict[type[Any], dict[str, FieldInfo]] = {}
+_marks: dict[tuple[type[Any], type[Any]], dict[str, Any]] = {}
+
+
+def fields_of(part: type[Any]) -> dict[str, FieldInfo]:
+    """Return the fields of a part of the card language by their names in Python, in order."""
+    if part not in _fields:
+        if issubclass(part, BaseModel):
+            _fields[part] = dict(part.model_fields)
+        else:
+            hints = typing.get_type_hints(part, include_extras=True)
+            _fields[part] = {f.name: _field(hints[f.name], f) for f in dataclasses.fields(part)}
+    return _fields[part]
+
+
+def _field(annotation: Any, field: dataclasses.Field[Any]) -> FieldInfo:
+    found = FieldInfo.from_annotation(annotation)
+    if field.default is not dataclasses.MISSING:
+        found.default = field.default
+    return found
+
+
+def parts_in(annotation: Any) -> list[type[Any]]:
+    """Return the parts of the card language that a type names, as in ``SignalFilter[R] | None``."""
+    named = typing.get_origin(annotation) or annotation
+    if isinstance(named, type) and (dataclasses.is_dataclass(named) or issubclass(named, BaseModel)):
+        return [named]
+    return [part for argument in typing.get_args(annotation) for part in parts_in(argument)]
+
+
+def marked(part: type[Any], kind: type[Mark]) -> dict[str, Mark]:
+    """Return the fields of a part that bear a mark of that kind, and the mark.
+
+    Parameters
+    ----------
+    part : type
+        A class of the card language.
+    kind : type
+        `Names`, `Beyond`, `AtRest` or `PerScan`.
+    """
+    if (part, kind) not in _marks:
+        found = {name: [m for m in field.metadata if isinstance(m, kind)] for name, field in fields_of(part).items()}
+        _marks[part, kind] = {name: marks[0] for name, marks in found.items() if marks}
+    return _marks[part, kind]
+
+
+def walk(tree: Any, kind: type[Mark]) -> Iterator[tuple[tuple[str, ...], Any, Mark]]:
+    """Yield path, owner and mark of every field with a mark of that kind that is there, in the order of the language.
+
+    Parameters
+    ----------
+    tree : object
+        A card's equation, an algorithm, or a part of one.
+    kind : type
+        `Names`, `Beyond`, `AtRest` or `PerScan`.
+    """
+    marks = marked(type(tree), kind)
+    for name in fields_of(type(tree)):
+        if name in marks:
+            yield (name,), tree, marks[name]
+        value = getattr(tree, name)
+        if dataclasses.is_dataclass(value):
+            below: Iterator[tuple[tuple[str, ...], Any, Any]] = walk(value, kind)
+            yield from (((name, *path), owner, mark) for path, owner, mark in below)
+
+
+def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
+    """Return an algorithm, or a part of one, with all fields of that mark at their neutral values; itself where they are.
+
+    Parameters
+    ----------
+    tree : object
+        The algorithm, or the part.
+    kind : type
+        `Beyond` or `AtRest`.
+    """
+    marks: dict[str, Any] = marked(type(tree), kind)
+    changed: dict[str, Any] = {}
+    for name in fields_of(type(tree)):
+        value = getattr(tree, name)
+        if name in marks:
+            new = marks[name].neutral
+        else:
+            new = without(value, kind) if dataclasses.is_dataclass(value) else value
+        if new is not value and new != value:
+            changed[name] = new
+    return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[type-var]
