@@ -10,6 +10,7 @@ import pidemu
 from pidemu.card.library import card_files
 from pidemu.card.load import Card, leaves, load_file, overlay, variants
 from pidemu.card.model.base import Status
+from pidemu.card.windup.clamp import WindupClamp
 from pidemu.errors import CardError, SettingError
 from tests.checks.bench import CHOICE, VALID, WINDUP, edited, loaded
 
@@ -69,7 +70,7 @@ def test_leaves_are_the_paths_of_scalars_lists_and_empty_mappings() -> None:
 
 def test_a_variant_replaces_the_windup_of_another_scheme(tmp_path: Path) -> None:
     windup = two_options(tmp_path).variant({"ANTIWINDUP": "clamp"}).equation.integral.windup
-    assert windup.model_dump(exclude_defaults=True) == {"scheme": "clamp"}
+    assert windup == WindupClamp(scheme="clamp")
 
 
 def test_a_variant_without_its_setting_has_lost_it(tmp_path: Path) -> None:

@@ -13,9 +13,9 @@ import pytest
 import pidemu
 from pidemu.card.document import parse
 from pidemu.card.load import card_from
-from pidemu.card.model import around as stages
-from pidemu.card.model import base, integral, terms
-from pidemu.card.model import card_file as models
+from pidemu.card.model.card_file import CardFile
+from pidemu.card.model.marks import fields_of, parts_in
+from pidemu.card.windup import SCHEMES, Scheme
 from pidemu.errors import CardError
 from tools.regenerate import RENEW, card_reference, card_schema
 
@@ -168,6 +168,12 @@ def test_every_part_of_the_language_is_in_the_reference() -> None:
     }
     linked = set(re.findall(r"\(#([a-z-]+)\)", card_reference.reference()))
     assert linked <= headings
-    rooms = (base, integral, models, stages, terms)
-    parts = {name.lower() for room in rooms for name, c in vars(room).items() if isinstance(c, type) and issubclass(c, base.Model)}
-    assert parts - {"model"} == {heading.replace("-", "") for heading in headings - {"card"} | {"cardfile"}}
+    parts = {part.__name__.lower() for part in all_parts(CardFile)}
+    assert parts | {"equation"} == {heading.replace("-", "") for heading in headings - {"card"} | {"cardfile"}}
+
+
+def all_parts(part: type[Any]) -> set[type[Any]]:
+    """The part and all that its fields name, of the windup schemes all."""
+    inner = {p for field in fields_of(part).values() for p in parts_in(field.annotation)}
+    named = inner - {Scheme} | (set(SCHEMES) if Scheme in inner else set())
+    return {part}.union(*(all_parts(p) for p in named))

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pidemu.card.model.around import STARTS
 
 import pidemu
-from pidemu.card.model.around import STARTS
 from pidemu.certificate import limit_test as windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences

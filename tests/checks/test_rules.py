@@ -353,36 +353,6 @@ EQUATIONS: tuple[Case, ...] = (
         ("11:67: 'derivative-time' is kd/kp, and this card has no proportional term",),
     ),
     (
-        "reject_bad_windup",
-        ((WINDUP, "{scheme: velocity}"),),
-        ("10:39: windup 'velocity' does not go with implementation 'positional'",),
-    ),
-    (
-        "reject_bad_windup",
-        (("implementation: positional", "implementation: velocity"),),
-        ("10:39: windup 'back-calculation' does not go with implementation 'velocity'",),
-    ),
-    (
-        "reject_bad_windup",
-        ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
-        ("10:42: external-reset is defined for the backward and forward rules",),
-    ),
-    (
-        "reject_bad_windup",
-        (("proportional: {on: error}", "proportional: {on: error, accumulated: true}"), (CHOICE, "{scan: {default: 2 s}}")),
-        ("9:27: 'accumulated' belongs to a positional P on pv",),
-    ),
-    (
-        "reject_bad_windup",
-        ((WINDUP, "{scheme: clamp-sum}"), ("proportional: {on: error}", "proportional: {on: pv}")),
-        ("10:39: clamp-sum with P on pv needs 'proportional.accumulated: true'",),
-    ),
-    (
-        "reject_bad_windup",
-        ((CHOICE, "{integral: {windup: {scheme: velocity}}}"),),
-        ("23:25: windup 'velocity' does not go with implementation 'positional'",),
-    ),
-    (
         "reject_wrong_action",
         (("direct: Direct", "direct: Auto"), ("reverse: Reverse", "reverse: Auto"), ("name: Reverse", "name: Auto")),
         ("25:3: reverse and direct have the same name 'Auto'",),

@@ -149,42 +149,62 @@ CASES: tuple[Case, ...] = (
         ("23:48: 'holds: e' needs one gain for all terms, which the parallel form does not have; remove it",),
     ),
     (
-        "reject_bad_windup_details",
-        ((WINDUP, "{scheme: conditional, direction: both}"),),
-        ("10:39: 'judged-on', 'direction' and 'resumes-from' belong to 'freeze'",),
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: velocity}"),),
+        ("10:39: windup 'velocity' does not go with implementation 'positional'",),
     ),
     (
-        "reject_bad_windup_details",
-        ((WINDUP, "{scheme: freeze, test: error-times-output}"),),
-        ("10:39: 'test' and 'last-increment' belong to 'conditional'",),
+        "reject_bad_windup",
+        (("implementation: positional", "implementation: velocity"),),
+        ("10:39: windup 'back-calculation' does not go with implementation 'velocity'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: external-reset}"), ("rule: backward", "rule: trapezoidal")),
+        ("10:42: external-reset is defined for the backward and forward rules",),
+    ),
+    (
+        "reject_accumulated_elsewhere",
+        (("proportional: {on: error}", "proportional: {on: error, accumulated: true}"), (CHOICE, "{scan: {default: 2 s}}")),
+        ("9:27: 'accumulated' belongs to a positional P on pv",),
+    ),
+    (
+        "reject_bad_windup",
+        ((WINDUP, "{scheme: clamp-sum}"), ("proportional: {on: error}", "proportional: {on: pv}")),
+        ("10:39: clamp-sum with P on pv needs 'proportional.accumulated: true'",),
+    ),
+    (
+        "reject_bad_windup",
+        ((CHOICE, "{integral: {windup: {scheme: velocity}}}"),),
+        ("23:25: windup 'velocity' does not go with implementation 'positional'",),
+    ),
+    (
+        "reject_bad_windup",
         ((WINDUP, "{scheme: conditional, test: error-times-output}"),),
         ("10:39: 'test: error-times-output' stops the way back too and keeps nothing: write 'last-increment: dropped'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: conditional, last-increment: dropped}"), ("rule: backward", "rule: forward")),
         ("10:38: 'last-increment' has no meaning under the forward rule, whose increment comes after the output",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: freeze, resumes-from: last-integrated}"),),
         ("10:39: 'resumes-from' belongs to the trapezoidal rule",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: freeze, judged-on: sum, direction: both}"), ("rule: backward", "rule: forward")),
         ("10:38: 'judged-on: sum' needs this scan's increment in the sum: a backward or trapezoidal rule",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: freeze, judged-on: sum}"),),
         ("10:39: 'judged-on: sum' forgets the increment whichever way it goes: write 'direction: both'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         (
             (WINDUP, "{scheme: freeze, judged-on: sum, direction: both, resumes-from: last-integrated}"),
             ("rule: backward", "rule: trapezoidal"),
@@ -192,17 +212,17 @@ CASES: tuple[Case, ...] = (
         ("10:42: 'resumes-from' has no meaning with 'judged-on: sum'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: back-calculation, tracking-time: Ti, times: Ti}"),),
         ("10:39: 'times' and 'when-off' go with a number or a setting under 'tracking-time'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: back-calculation, tracking-time: 4, when-off: Ti}"),),
         ("10:39: 'when-off' goes with a setting under 'tracking-time'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         (
             (WINDUP, "{scheme: back-calculation, tracking-time: NI}"),
             (ALPHA, ALPHA + '  NI: {sets: tracking-time, unit: "1"}\n'),
@@ -211,7 +231,7 @@ CASES: tuple[Case, ...] = (
         ("10:39: 'NI' is a plain ratio; say of what: 'times: Ti'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         (
             (WINDUP, "{scheme: back-calculation, tracking-time: TT, times: Ti}"),
             (ALPHA, ALPHA + "  TT: {sets: tracking-time, unit: min}\n"),
@@ -220,7 +240,7 @@ CASES: tuple[Case, ...] = (
         ("10:39: 'TT' is a time already; remove 'times'",),
     ),
     (
-        "reject_bad_windup_details",
+        "reject_bad_windup",
         ((WINDUP, "{scheme: reset-outside-band}"), (CHOICE, "{proportional: {on: none}}")),
         ("10:39: reset-outside-band needs a proportional term, whose band it is",),
     ),

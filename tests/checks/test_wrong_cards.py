@@ -17,8 +17,8 @@ _SETS = (
     "or 'closed-loop-time'"
 )
 _SCHEMES = (
-    "'none', 'clamp', 'clamp-sum', 'freeze', 'conditional', 'recompute', 'back-calculation', 'external-reset', 'velocity', "
-    "'reset-outside-band'"
+    "'back-calculation', 'clamp', 'clamp-sum', 'conditional', 'external-reset', 'freeze', 'none', 'recompute', "
+    "'reset-outside-band', 'velocity'"
 )
 _NAME = "is not a name: letters, digits and underscores, starting with a letter"
 _WORDS = "'error', 'pv', 'weighted' or 'none'"
@@ -194,6 +194,14 @@ WRONG_WINDUP: dict[str, Case] = {
     "a key of another scheme": (
         (WINDUP, "{scheme: clamp, tracking-time: Ti}"),
         ("10:63: 'tracking-time' does not go with scheme 'clamp'",),
+    ),
+    "a key of freeze": (
+        (WINDUP, "{scheme: conditional, direction: both}"),
+        ("10:69: 'direction' does not go with scheme 'conditional'",),
+    ),
+    "a key of conditional": (
+        (WINDUP, "{scheme: freeze, test: error-times-output}"),
+        ("10:64: 'test' does not go with scheme 'freeze'",),
     ),
     "a key that its scheme needs": ((WINDUP, "{scheme: back-calculation}"), ("10:39: missing key 'tracking-time'",)),
     "a misspelt key": (

@@ -95,7 +95,9 @@ def test_a_remote_setpoint_is_a_setpoint_where_cascade_has_no_structure_of_its_o
 ) -> None:
     chosen = settings_of(data, pidemu.load_card(name))
     a = chosen.algorithm()
-    if a.cascade_b is not None or a.setpoint.tracks or a.setpoint.rate_counts == "local":  # what tracks the measurement or has a rate is the local one
+    if (
+        a.cascade_b is not None or a.setpoint.tracks or a.setpoint.rate_counts == "local"
+    ):  # what tracks the measurement or has a rate is the local one
         return
     h, x = data.draw(scans_of(a)), history(seed).columns
     remote, local = (Controller(chosen, h, initial_output=30.0) for _ in range(2))

@@ -41,7 +41,13 @@ def rules(s: Settings) -> tuple[object, ...]:
     a = s.algorithm()
     lags = [x.rule for x in (a.setpoint.filter, a.measurement.filter, a.error.filter) if x is not None]
     terms = (a.integral.rule if a.ki else None, (a.derivative.rule, a.filter_rule) if a.kd else None)
-    return (*terms, a.filter_rule if a.Tf and a.filter_on != "term" else None, a.measurement.previous_scan, a.arithmetic.type, *lags)
+    return (
+        *terms,
+        a.filter_rule if a.Tf and a.filter_on != "term" else None,
+        a.measurement.previous_scan,
+        a.arithmetic.type,
+        *lags,
+    )
 
 
 @given(data=st.data())

@@ -76,7 +76,9 @@ def times(s: Settings) -> tuple[float, float]:
 def test_to_the_parallel_form_and_back_is_exact_where_the_first_step_is(card: str, data: st.DataObject) -> None:
     s = settings_that_act(data, pidemu.load_card(card))
     a = s.algorithm()
-    assume(a.setpoint.filter is a.measurement.filter is a.error.filter is None)  # the way back holds these, and the parallel form has none
+    assume(
+        a.setpoint.filter is a.measurement.filter is a.error.filter is None
+    )  # the way back holds these, and the parallel form has none
     try:
         there = pidemu.convert(s, "generic/parallel", mode="auto", assume=True, emulate=False)
     except ConversionRefusedError:

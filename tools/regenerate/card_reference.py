@@ -8,10 +8,12 @@ import typing
 from enum import StrEnum
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from pidemu.card.model.base import R, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation
+from pidemu.card.model.marks import fields_of, parts_in
+from pidemu.card.windup import SCHEMES, Scheme
 
 BEGIN: Final = "<!-- generated from src/pidemu/card/model/card_file.py: begin -->"
 END: Final = "<!-- generated from src/pidemu/card/model/card_file.py: end -->"
@@ -29,23 +31,23 @@ def reference() -> str:
             "| key | value | | meaning |",
             "|---|---|---|---|",
         ]
-        for name, field in model.model_fields.items():
-            if model is CardFile and name in Equation.model_fields:
+        for name, field in fields_of(model).items():
+            if model is CardFile and name in fields_of(Equation):
                 continue
             need = "required" if field.is_required() else _default(field)
             meaning = (field.description or "").replace("|", "\\|")
-            lines.append(f"| `{field.alias or name}` | {_type(field)} | {need} | {meaning} |")
+            lines.append(f"| `{field.alias or hyphenated(name)}` | {_type(field)} | {need} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
 
 
-def _parts() -> list[type[BaseModel]]:
+def _parts() -> list[type[Any]]:
     """Return the models of a card in the order in which its fields name them, the fields of its equation first."""
-    found: list[type[BaseModel]] = [CardFile, Equation]
+    found: list[type[Any]] = [CardFile, Equation]
 
-    def walk(model: type[BaseModel]) -> None:
-        for field in model.model_fields.values():
-            for part in _models(field.annotation):
+    def walk(model: type[Any]) -> None:
+        for field in fields_of(model).values():
+            for part in _parts_of(field.annotation):
                 if part not in found:
                     found.append(part)
                     walk(part)
@@ -55,14 +57,13 @@ def _parts() -> list[type[BaseModel]]:
     return found
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models that an annotation names."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for argument in typing.get_args(annotation) for model in _models(argument)]
+def _parts_of(annotation: Any) -> list[type[Any]]:
+    """Return the parts that an annotation names; of the windup schemes all."""
+    found = parts_in(annotation)
+    return list(SCHEMES) if found == [Scheme] else found
 
 
-def _heading(model: type[BaseModel]) -> str:
+def _heading(model: type[Any]) -> str:
     name = {"CardFile": "Card"}.get(model.__name__, model.__name__)
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
 
@@ -86,9 +87,9 @@ def _name(t: Any) -> str:
         return "setting's name" if arguments[0] is str and "pattern" in repr(arguments[1:]) else _name(arguments[0])
     if origin in (typing.Union, types.UnionType):
         names = [_name(a) for a in arguments if a is not type(None)]
-        if all(n.startswith("[Windup") for n in names):
-            return "one of the windup schemes below"
         return " or ".join(dict.fromkeys(names))
+    if t is R:
+        return "setting's name or number"
     if t is Any:
         return "anything"
     if origin is dict:
@@ -99,9 +100,12 @@ def _name(t: Any) -> str:
         return f"[{', '.join(_name(a) for a in arguments)}]"
     if isinstance(t, type) and issubclass(t, StrEnum):
         return ", ".join(f"`{m.value}`" for m in t)
-    if isinstance(t, type) and issubclass(t, BaseModel):
-        heading = _heading(t)
-        return f"[{t.__name__}](#{heading.lower().replace(' ', '-')})"
+    parts = parts_in(t)
+    if parts and all(issubclass(part, Scheme) for part in parts):
+        return "one of the windup schemes below"
+    if parts:
+        (part,) = parts
+        return f"[{part.__name__}](#{_heading(part).lower().replace(' ', '-')})"
     return {str: "text", float: "number", bool: "true or false", int: "integer"}.get(t, getattr(t, "__name__", "anything"))
 
 

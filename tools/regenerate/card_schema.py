@@ -14,7 +14,7 @@ _WHOLE: Final = ("Filter", "SignalFilter", "Windup")
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a card, with unions as ``if``/``then`` so that editors follow them."""
-    plain: dict[str, Any] = CardFile.model_json_schema(by_alias=True)
+    plain = _plainly_named(CardFile.model_json_schema(by_alias=True))
     definitions = plain["$defs"]
     definitions["Overlay"] = _overlay(definitions)
     definitions["Option"]["properties"]["choices"]["additionalProperties"] = {"$ref": "#/$defs/Overlay"}
@@ -24,13 +24,22 @@ def schema() -> dict[str, Any]:
 
 def _overlay(definitions: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of what a choice overlays: the equation with nothing required."""
-    full: dict[str, Any] = Equation.model_json_schema(by_alias=True)
+    full = _plainly_named(Equation.model_json_schema(by_alias=True))
     definitions.update({name: d for name, d in full.get("$defs", {}).items() if name not in definitions})
     for name in list(full["$defs"]):
         if full["$defs"][name].get("type") == "object" and not name.startswith(_WHOLE):
             definitions[f"Partial{name}"] = _partial(full["$defs"][name], definitions)
     body = _partial({k: v for k, v in full.items() if k != "$defs"}, definitions)
     return {**body, "title": "Overlay", "description": "Fields of the equation that a choice changes."}
+
+
+def _plainly_named(found: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema with parts under the names of their classes, without what they are made generic with."""
+    text = json.dumps(found)
+    for name in sorted(found["$defs"], key=len, reverse=True):
+        text = text.replace(name, name.partition("_Union_")[0])
+    plain: dict[str, Any] = json.loads(text)
+    return plain
 
 
 def _partial(definition: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:

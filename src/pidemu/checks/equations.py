@@ -191,7 +191,7 @@ def _wrong_number(field: str, role: str, x: float) -> str | None:
 def reject_bad_weights(variant: Variant) -> Iterator[Problem]:
     """A weight goes with 'on: weighted' and with nothing else."""
     q = variant.equation
-    parts: list[tuple[Path_, Proportional[Reference] | Derivative]] = [
+    parts: list[tuple[Path_, Proportional[Reference] | Derivative[Reference]]] = [
         (("proportional",), q.proportional),
         (("derivative",), q.derivative),
     ]
@@ -229,21 +229,6 @@ def reject_bad_filter(variant: Variant) -> Iterator[Problem]:
         yield document.problem((*home, "rule"), message)
 
 
-def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
-    """The windup scheme fits the equation that it stands in."""
-    home = variant.home(("integral", "windup"))
-    for message in variant.equation.integral.windup.faults(variant.equation):
-        yield variant.card.document.problem(home, message, at_key=True)
-
-
-def reject_accumulated_elsewhere(variant: Variant) -> Iterator[Problem]:
-    """Only a positional P on PV can be accumulated."""
-    P = variant.equation.proportional
-    if P.accumulated and (P.on != "pv" or variant.equation.implementation != "positional"):
-        place = variant.home(("proportional", "accumulated"))
-        yield variant.card.document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
-
-
 def reject_wrong_action(variant: Variant) -> Iterator[Problem]:
     """The one-scan example of the action is true when it is run."""
     example, names = variant.equation.action.example, variant.equation.action.names
@@ -274,8 +259,6 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_constants,
     reject_bad_weights,
     reject_bad_filter,
-    reject_bad_windup,
-    reject_accumulated_elsewhere,
     *stages.RULES,
     reject_wrong_action,
 )

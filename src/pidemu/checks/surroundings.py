@@ -122,6 +122,21 @@ def _wrong_state(equation: Equation) -> str | None:
     return None
 
 
+def reject_bad_windup(variant: Variant) -> Iterator[Problem]:
+    """The windup scheme fits the equation that it stands in."""
+    home = variant.home(("integral", "windup"))
+    for message in variant.equation.integral.windup.faults(variant.equation):
+        yield variant.card.document.problem(home, message, at_key=True)
+
+
+def reject_accumulated_elsewhere(variant: Variant) -> Iterator[Problem]:
+    """Only a positional P on PV can be accumulated."""
+    P = variant.equation.proportional
+    if P.accumulated and (P.on != "pv" or variant.equation.implementation != "positional"):
+        place = variant.home(("proportional", "accumulated"))
+        yield variant.card.document.problem(place, "'accumulated' belongs to a positional P on pv", at_key=True)
+
+
 def reject_bad_transfer(variant: Variant) -> Iterator[Problem]:
     """The fine print of a transfer goes with the transfer that it belongs to."""
     equation, document = variant.equation, variant.card.document
@@ -234,6 +249,8 @@ RULES: Final[tuple[Callable[[Variant], Iterator[Problem]], ...]] = (
     reject_bad_error,
     reject_bad_cascade,
     reject_bad_integral,
+    reject_bad_windup,
+    reject_accumulated_elsewhere,
     reject_bad_transfer,
     reject_bad_feedforward,
     reject_bad_faults,

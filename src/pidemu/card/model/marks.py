@@ -66,7 +66,7 @@ class PerScan:
     """The field says how the law is computed scan by scan, or what happens at limits and transfers: the law is the same without."""
 
 
-Mark = TypeVar("Mark", Names, Beyond, AtRest, PerScan)
+Mark = TypeVar("Mark", bound=Names | Beyond | AtRest | PerScan)
 Tree = TypeVar("Tree")
 _fields: dict[type[Any], dict[str, FieldInfo]] = {}
 _marks: dict[tuple[type[Any], type[Any]], dict[str, Any]] = {}
@@ -96,6 +96,10 @@ def parts_in(annotation: Any) -> list[type[Any]]:
     if isinstance(named, type) and (dataclasses.is_dataclass(named) or issubclass(named, BaseModel)):
         return [named]
     return [part for argument in typing.get_args(annotation) for part in parts_in(argument)]
+
+
+def _is_part(value: object) -> bool:
+    return dataclasses.is_dataclass(value)
 
 
 def marked(part: type[Any], kind: type[Mark]) -> dict[str, Mark]:
@@ -129,9 +133,9 @@ def walk(tree: Any, kind: type[Mark]) -> Iterator[tuple[tuple[str, ...], Any, Ma
         if name in marks:
             yield (name,), tree, marks[name]
         value = getattr(tree, name)
-        if dataclasses.is_dataclass(value):
-            below: Iterator[tuple[tuple[str, ...], Any, Any]] = walk(value, kind)
-            yield from (((name, *path), owner, mark) for path, owner, mark in below)
+        if _is_part(value):
+            for inner, owner, mark in walk(value, kind):
+                yield (name, *inner), owner, mark
 
 
 def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
@@ -151,7 +155,7 @@ def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
         if name in marks:
             new = marks[name].neutral
         else:
-            new = without(value, kind) if dataclasses.is_dataclass(value) else value
+            new = without(value, kind) if _is_part(value) else value
         if new is not value and new != value:
             changed[name] = new
     return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[type-var]

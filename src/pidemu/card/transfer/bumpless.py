@@ -9,7 +9,7 @@ class Bumpless(Start):
     """The first automatic output equals the last output, `I = u - P - D`."""
 
     word = "bumpless"
-    meaning = "The first automatic output equals the last output, `I = u - P - D`."
+    meaning = "the first automatic output equals the last output, `I = u - P - D`."
     of_a_controller = "does not bump"
     at_the_transfer = "bumpless: the integral is set to what the last output leaves for it"
     can_hold = False

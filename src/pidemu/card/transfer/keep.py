@@ -9,7 +9,7 @@ class Keep(Start):
     """The integral stands as it stood."""
 
     word = "keep"
-    meaning = "The integral stands as it stood."
+    meaning = "the integral stands as it stood."
     of_a_controller = "keeps the integral as it stood"
     in_manual = "; the integral stands still"
     at_the_transfer = "the integral goes on from where it stood: a bump"

@@ -9,7 +9,7 @@ class Running(Start):
     """The algorithm runs on in manual, and only its output is not used."""
 
     word = "running"
-    meaning = "The algorithm runs on in manual, and only its output is not used."
+    meaning = "the algorithm runs on in manual, and only its output is not used."
     of_a_controller = "computes on in manual, so that the output jumps to what it has computed"
     in_manual = "; the algorithm runs on, unused"
     at_the_transfer = "the algorithm takes over as it ran: a bump"

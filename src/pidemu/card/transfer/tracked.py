@@ -6,10 +6,13 @@ from pidemu.card.transfer.start import Start
 
 
 class Tracked(Start):
-    """In manual the integral is set every scan to what the output leaves for it, and the first automatic scan moves on from there."""
+    """In manual the integral follows the output, and the first automatic scan moves on from there."""
 
     word = "tracked"
-    meaning = "In manual the integral is set every scan to what the output leaves for it, and the first automatic scan moves on from there."
+    meaning = (
+        "in manual the integral is set every scan to what the output leaves for it, and the first automatic scan moves on from "
+        "there."
+    )
     of_a_controller = "lets the integral track the output in manual and goes on from there"
     in_manual = "; the integral follows it"
     at_the_transfer = "the integral goes on from where it followed the output"

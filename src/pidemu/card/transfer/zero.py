@@ -6,10 +6,10 @@ from pidemu.card.transfer.start import Start
 
 
 class Zero(Start):
-    """It starts at zero."""
+    """The integral starts at zero."""
 
     word = "zero"
-    meaning = "It starts at zero."
+    meaning = "the integral starts at zero."
     of_a_controller = "starts with an integral of zero"
     in_manual = "; the integral is 0"
     at_the_transfer = "the integral starts at zero: a bump"
