@@ -19,6 +19,7 @@ from pidemu.law.law import Law
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
 from pidemu.program.builder import build
+from pidemu.program.ir import StateRole
 from pidemu.settings.settings import Settings
 
 _WIDE: Final = (-1e12, 1e12)
@@ -175,7 +176,7 @@ def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Ite
     """Yield the integral of the absolute error per block of scans, after a load step of 1 % from rest [% s]."""
     linear = algorithm.linear
     running = Running(lambda _h: linear, lambda a, h: build(a, h, limits=_WIDE), h)
-    running.take_over({"u": 0.0}, {"sp": 0.0, "pv": 0.0, "auto": 1.0, "manual": nan})
+    running.take_over({StateRole.OUTPUT: 0.0}, {"sp": 0.0, "pv": 0.0, "auto": 1.0, "manual": nan})
     scan, state, plant = running.compiled.scan, running.state, Plant(process.sampled(h))
     last = 0.0
     while True:

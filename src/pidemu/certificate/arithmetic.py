@@ -14,11 +14,12 @@ from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.scaled_controller import Side
 from pidemu.errors import PidemuError
 from pidemu.program.builder import build
+from pidemu.program.ir import StateRole
 from pidemu.records.files import Record
 from pidemu.records.sampling import Scale
 from pidemu.records.standard import REST
 
-_KEPT: Final = ("I", "M", "Ir")
+_KEPT: Final = (StateRole.INTEGRAL, StateRole.COUNTS, StateRole.INTEGRAL_REMAINDER)
 """States that an integral is kept in: the sum; with whole numbers the output's sum and the remainder."""
 _RANGE: Final = (1e-18, 50.0)
 """Errors between which the smallest that integrates is looked for [% of span]; the first is nothing beside a signal of 50 %."""
@@ -63,7 +64,7 @@ def smallest_error(side: Side) -> float:
     program = build(plain, side.scan, limits=_FREE, initial_output=scale.output_own(50.0))
     functions = compiled(program)
     names = [q.name for q in program.states]
-    watched = [names.index(name) for name in _KEPT if name in names] or [names.index("u")]
+    watched = [names.index(name) for name in _KEPT if name in names] or [names.index(StateRole.OUTPUT)]
     rest = scale.own(Record(sp=np.array([REST, REST + 1.0]), pv=np.array([REST, REST])))
     at, unit = float(rest.sp[0]), float(rest.sp[1] - rest.sp[0])
 

@@ -34,6 +34,7 @@ from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.formatting import json_safe
 from pidemu.plausible import plain_number
+from pidemu.program.ir import StateRole
 from pidemu.records.files import Floats, Record, read_record, write_record
 from pidemu.records.playback import Playback, Timing, far_out, play, timing
 from pidemu.settings.action import Action
@@ -146,17 +147,21 @@ def _start(controller: Controller, words: tuple[str, ...], has_output: bool) -> 
     known = controller.state
     states: dict[str, float] = {}
     for word, text in given.items():
-        name = "u" if word == "output" else word
+        name = StateRole.OUTPUT if word == "output" else word
         if name not in known:
             names = [*known, "output"]
             raise SettingError(f"--initial {word}: no such state{suggest(word, names)}; states: {', '.join(names)}")
-        if name in states or (name == "u" and has_output):
+        if name in states or (name == StateRole.OUTPUT and has_output):
             raise SettingError("the output before the first scan is given twice; give it once")
         states[name] = _number(word, str(text))
     if states:
         controller.start(**states)
-    others = [n for n, x in controller.state.items() if n not in states and n not in ("u", "on", "begun") and x == 0]
-    if "I" in states and others:
+    others = [
+        n
+        for n, x in controller.state.items()
+        if n not in states and n not in (StateRole.OUTPUT, StateRole.MODE, StateRole.BEGUN) and x == 0
+    ]
+    if StateRole.INTEGRAL in states and others:
         return [f"with I given the controller goes on as if it had been running; what else it holds is 0: {', '.join(others)}"]
     return []
 

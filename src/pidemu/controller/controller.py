@@ -20,7 +20,7 @@ from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Floats, Mod
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.plausible import INTERVAL, LEVEL, SIGNAL, number, plausible, shown
 from pidemu.program.builder import build
-from pidemu.program.ir import Program
+from pidemu.program.ir import Program, StateRole
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 
@@ -169,7 +169,7 @@ class Controller:
     @property
     def output(self) -> float:
         """The last output."""
-        return self._running["u"]
+        return self._running[StateRole.OUTPUT]
 
     @property
     def mode(self) -> Mode:
@@ -213,7 +213,7 @@ class Controller:
                 raise ScanError(f"no state '{name}'{suggest(name, names)}; states: {', '.join(names)}")
             if not isfinite(_number(f"the state {name}", value)):
                 raise ScanError(f"the state {name} = {value} is not a finite number")
-        running = {name: 1.0 for name in ("on", "begun") if "I" in states and name in names}
+        running = {name: 1.0 for name in (StateRole.MODE, StateRole.BEGUN) if StateRole.INTEGRAL in states and name in names}
         for name, value in (running | states).items():
             self._running[name] = value
 
@@ -238,7 +238,7 @@ class Controller:
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
         last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
-        self._running.take_over({"u": float(output)}, last)
+        self._running.take_over({StateRole.OUTPUT: float(output)}, last)
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
 
@@ -305,11 +305,11 @@ class Controller:
         old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
         if a.ki or a.velocity or a.transfer.without_integral != "kept" or a.transfer.way.loads_output:
             return 0.0
-        if not old.ki or "I" not in self._running:
+        if not old.ki or StateRole.INTEGRAL not in self._running:
             return self._kept
         sign = 1.0 if self._action == "reverse" else -1.0
         scale = {"ki e": 1.0, "e/Ti": sign * a.kp, "e": 0.0}[old.integral.holds]
-        return scale * self._running["I"]
+        return scale * self._running[StateRole.INTEGRAL]
 
     def scan(
         self,
@@ -488,13 +488,13 @@ class Controller:
             by_hand = inputs[3] if mode == "manual" else follow if mode == "tracking" else nan
             moved = not isnan(by_hand)
             if moved:
-                self._running["u"] = u = by_hand
+                self._running[StateRole.OUTPUT] = u = by_hand
             if mode == "manual":
-                self._running["u"] = u = self._by_hand(u, moved=moved)
+                self._running[StateRole.OUTPUT] = u = self._by_hand(u, moved=moved)
             u = self.output
             a = self.settings.algorithm()
-            for name, value in (("own", u), ("on", 0.0)):
-                if name in self._running and not (name == "own" and a.transfer.way.runs_on):
+            for name, value in ((StateRole.OWN_OUTPUT, u), (StateRole.MODE, 0.0)):
+                if name in self._running and not (name == StateRole.OWN_OUTPUT and a.transfer.way.runs_on):
                     self._running[name] = value
             if mode != self._mode:  # a transfer to automatic waits until something is computed
                 self._transfer(self._count, mode, u - was)

@@ -16,7 +16,7 @@ from pidemu.backends.choice import Choice, safe_runner
 from pidemu.backends.python import Compiled, compiled
 from pidemu.backends.runner import Runner
 from pidemu.errors import ScanError
-from pidemu.program.ir import Program
+from pidemu.program.ir import Program, StateRole
 
 _REMEMBERED: Final = 64
 """Programs kept for other scan intervals."""
@@ -115,9 +115,9 @@ class Running:
         """Let float32 arithmetic overflow and make NaN without a warning, as the real thing does."""
         return np.errstate(all="ignore") if self.program.precision == "float32" else contextlib.nullcontext()
 
-    def would_be(self, last: Mapping[str, float], name: str = "u") -> float:
+    def would_be(self, last: Mapping[str, float], name: str = StateRole.OUTPUT) -> float:
         """Return what the next scan would compute under a name; nothing changes."""
-        functions = self.compiled if name == "u" else compiled(replace(self.program, output=name))
+        functions = self.compiled if name == StateRole.OUTPUT else compiled(replace(self.program, output=name))
         with self.quiet():
             return float(functions.scan(list(self.state), *self.inputs(last)))
 
@@ -144,13 +144,17 @@ class Running:
         if not last or not new:
             return
         other = self._before_a_scan_that_moves_nothing()
-        rest = _resting(other, self._by_hand(last, old["u"]))
-        rest |= {"own": old["u"], "begun": 1.0, "on": float(last["auto"] > 0 and isnan(last.get("track", nan)))}
+        rest = _resting(other, self._by_hand(last, old[StateRole.OUTPUT]))
+        rest |= {
+            StateRole.OWN_OUTPUT: old[StateRole.OUTPUT],
+            StateRole.BEGUN: 1.0,
+            StateRole.MODE: float(last["auto"] > 0 and isnan(last.get("track", nan))),
+        }
         for name in new:
             self[name] = rest.get(name, self[name])
-        if "I" in new:
+        if StateRole.INTEGRAL in new:
             other.reset()
-            self["I"] = self._left_for_the_integral(other, last, old["u"])
+            self[StateRole.INTEGRAL] = self._left_for_the_integral(other, last, old[StateRole.OUTPUT])
 
     def _before_a_scan_that_moves_nothing(self) -> Running:
         """Return this controller before the first scan, and that one such that it moves nothing."""
@@ -167,28 +171,28 @@ class Running:
 
     def _left_for_the_integral(self, other: Running, last: Mapping[str, float], u: float) -> float:
         """Return the integral with which the output stays where it is; `other` is this controller at rest."""
-        if "I" not in other:  # a loaded sum without integral action
-            self["I"] = 0.0
+        if StateRole.INTEGRAL not in other:  # a loaded sum without integral action
+            self[StateRole.INTEGRAL] = 0.0
             return u - self.would_be(last, "v")
         for name in other.named().keys() & self.named().keys():
             other[name] = self[name]
-        for name in {"on", "begun"} & other.named().keys():
-            other[name] = float(name == "begun")
+        for name in {StateRole.MODE, StateRole.BEGUN} & other.named().keys():
+            other[name] = float(name == StateRole.BEGUN)
         with other.quiet():
             other.compiled.scan(other.state, *other.inputs(self._by_hand(last, u)))
-        return other["I"]
+        return other[StateRole.INTEGRAL]
 
     def keep_output(self, old: Running, last: Mapping[str, float]) -> None:
         """Move the integral by what the proportional term becomes less, at the last signals: the listing's parameter change."""
-        if "I" in self and old.computes("P") and self.computes("P"):
+        if StateRole.INTEGRAL in self and old.computes("P") and self.computes("P"):
             moved = old.would_be(last, "P") - self.would_be(last, "P")
             if not isnan(moved):
-                self["I"] += moved
+                self[StateRole.INTEGRAL] += moved
 
 
 def _resting(other: Running, by_hand: Mapping[str, float]) -> dict[str, float]:
     """Return the states of a controller that has had the last signals for ever, in manual."""
-    other["u"] = by_hand["manual"]
+    other[StateRole.OUTPUT] = by_hand["manual"]
     with other.quiet():
         other.compiled.scan(other.state, *other.inputs(by_hand))
     return other.named()

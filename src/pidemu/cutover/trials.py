@@ -13,13 +13,23 @@ from pidemu.card.model.base import Rule
 from pidemu.controller.controller import Controller
 from pidemu.controller.running import Running
 from pidemu.cutover.bench import Bench
+from pidemu.program.ir import DERIVATIVE_STATES, StateRole
 
 NO_BUMP: Final = 1e-9
 """Moves of the output below this [% of span] are rounding in float64."""
 LONGEST: Final = 2**18
 """Scans after which filters that have not settled are left alone."""
 _UNLIMITED: Final = (-1e30, 1e30)
-_RESTLESS: Final = frozenset({"I", "u", "own", "inner", "Ir", "Dr"})
+_RESTLESS: Final = frozenset(
+    {
+        StateRole.INTEGRAL,
+        StateRole.OUTPUT,
+        StateRole.OWN_OUTPUT,
+        StateRole.INNER_SUM,
+        StateRole.INTEGRAL_REMAINDER,
+        StateRole.DERIVATIVE_REMAINDER,
+    }
+)
 """States that need not come to rest before the transfer: integral and output are set by it, remainders go round."""
 
 
@@ -111,7 +121,7 @@ def before(bench: Bench, way: Way) -> tuple[Controller, int | None]:
     if way.prepared:
         ctl.scan(bench.measured.other_than(way.sp), bench.pv, auto=False, manual=entry)
     waited = _settle(ctl, way.sp, bench.pv, entry)
-    preset = {} if way.load is None else {"u": way.load}
+    preset: dict[str, float] = {} if way.load is None else {StateRole.OUTPUT: way.load}
     if way.integral is not None:
         preset = _preset(bench, ctl.state, way.integral)
     if preset:
@@ -146,11 +156,13 @@ def proportional(ctl: Controller, bench: Bench, sp: float) -> float:
 
 def _preset(bench: Bench, state: Mapping[str, float], integral: float) -> dict[str, float]:
     """Return the states that go with an integral that is set: what the algorithm knows of its output is the output."""
-    preset = {"I": integral} | {name: bench.op for name in ("own", "inner") if name in state}
+    preset: dict[str, float] = {StateRole.INTEGRAL: integral} | {
+        name: bench.op for name in (StateRole.OWN_OUTPUT, StateRole.INNER_SUM) if name in state
+    }
     if bench.a.transfer.way.clears:  # set after the transfer has cleared it, and the derivative with it
-        preset |= {"on": 1.0}
+        preset |= {StateRole.MODE: 1.0}
         if bench.a.transfer.derivative == "zeroed":
-            preset |= {name: 0.0 for name in ("x1", "x2", "x3", "D") if name in state}
+            preset |= {name: 0.0 for name in DERIVATIVE_STATES if name in state}
     return preset
 
 
@@ -175,13 +187,15 @@ def _integrates_at_once(a: Algorithm, state: Mapping[str, float]) -> float:
     """Return the share of its increment that the integral adds in the first automatic scan (sections 4 and 6)."""
     if a.velocity or not a.ki or a.transfer.way.is_bumpless or a.integral.rule is Rule.FORWARD:
         return 0.0
-    if state.get("begun", 1.0) == 0:  # the first scan of all
+    if state.get(StateRole.BEGUN, 1.0) == 0:  # the first scan of all
         waits = a.transfer.first_scan == "holds" if a.transfer.power_up == "zero" or a.transfer.way.loads_output else True
         share = 0.5 if a.integral.starts == "zero" and a.integral.rule is Rule.TRAPEZOIDAL else 1.0
         return 0.0 if waits else share
     return (
         0.0
-        if a.transfer.first_scan == "holds" and not (a.transfer.way.runs_on or a.transfer.way.tracks) and not state.get("on")
+        if a.transfer.first_scan == "holds"
+        and not (a.transfer.way.runs_on or a.transfer.way.tracks)
+        and not state.get(StateRole.MODE)
         else 1.0
     )
 
@@ -194,6 +208,6 @@ def _increment(bench: Bench, way: Way) -> float:
     states = []
     for _ in range(3):  # the first may be a transfer
         ctl.scan(way.sp, bench.pv)
-        states.append(ctl.state["I"])
+        states.append(ctl.state[StateRole.INTEGRAL])
     gain, time = factors(bench.a, ctl)
     return gain * (states[2] - states[1]) / time

@@ -9,6 +9,7 @@ from pidemu.controller.controller import Controller
 from pidemu.cutover.bench import Bench
 from pidemu.cutover.trials import Cut, Way, before, cut_over, factors, is_none, proportional, term
 from pidemu.errors import SettingError
+from pidemu.program.ir import StateRole
 
 
 def best_way(bench: Bench) -> tuple[Way, Cut]:
@@ -37,14 +38,19 @@ def ways(bench: Bench) -> Iterator[Way]:
     for sp in setpoints:
         plain = Way(sp, bench.entry)
         ctl, _ = before(bench, plain)
-        if "I" in ctl.state and bench.a.transfer.way.can_preset:
+        if StateRole.INTEGRAL in ctl.state and bench.a.transfer.way.can_preset:
             yield replace(plain, integral=_integral(bench, ctl, sp))
             continue
         yield plain
         left = bench.op - proportional(ctl, bench, sp)
-        if bench.a.transfer.way.loads_output and "I" in ctl.state and bench.preset == "output":
+        if bench.a.transfer.way.loads_output and StateRole.INTEGRAL in ctl.state and bench.preset == "output":
             yield replace(plain, load=left)
-        if bench.is_bare and bench.a.transfer.without_integral == "kept" and "I" not in ctl.state and _fits(bench, left):
+        if (
+            bench.is_bare
+            and bench.a.transfer.without_integral == "kept"
+            and StateRole.INTEGRAL not in ctl.state
+            and _fits(bench, left)
+        ):
             yield replace(plain, bias=left)
 
 

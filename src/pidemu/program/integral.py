@@ -1,4 +1,4 @@
-"""A positional controller under construction, as windup schemes and transfers see it: the integral's state and what it counts for."""
+"""A positional controller under construction, as windup schemes and transfers see it, and what the integral's state counts for."""
 
 from __future__ import annotations
 

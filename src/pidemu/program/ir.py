@@ -7,9 +7,28 @@ both sides are numbers. Truth values are numbers too where they are kept in a st
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from enum import StrEnum
+from typing import Final, Literal, NamedTuple
 
 Operator = Literal["+", "-", "*", "/", "<", ">", "<=", ">=", "==", "!=", "and", "or"]
+
+
+class StateRole(StrEnum):
+    """States that others than the blocks of a program ask for, by what they are for; the value is the state's name in programs."""
+
+    INTEGRAL = "I"
+    OUTPUT = "u"
+    OWN_OUTPUT = "own"  # as the algorithm knows it, where the real one is stepped or not used
+    MODE = "on"  # whether the last scan was automatic
+    BEGUN = "begun"  # whether there has been a scan
+    INNER_SUM = "inner"  # the last sum without the derivative
+    COUNTS = "M"  # the output sum of integer arithmetic
+    INTEGRAL_REMAINDER = "Ir"
+    DERIVATIVE_REMAINDER = "Dr"
+
+
+DERIVATIVE_STATES: Final = ("x1", "x2", "x3", "D")
+"""Names of the states that the derivative may have: its signal one, two and three scans ago, and the filtered term."""
 
 
 class Expr:

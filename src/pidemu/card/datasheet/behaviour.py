@@ -150,10 +150,7 @@ def _action(q: Equation) -> str:
 def _meanwhile(q: Equation) -> str:
     """Return what integral and derivative do in manual."""
     t = q.transfer
-    if q.implementation == "velocity" or q.integral.on == "none":
-        integral = ""
-    else:
-        integral = t.way.in_manual
+    integral = "" if q.implementation == "velocity" or q.integral.on == "none" else t.way.in_manual
     if q.derivative.on == "none":
         return integral
     return integral + ("; D is 0 and starts from the present signal" if t.derivative == "preset" else "")

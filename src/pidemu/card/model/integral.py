@@ -44,8 +44,8 @@ class Integral(Part, Generic[R]):
         Literal["ki e", "e/Ti", "e"],
         means(
             "What the integral remembers. The sum of `ki e`: a changed gain or integral time counts for what is still to "
-            "come. The sum of `e/Ti`, multiplied by the gain afterwards, or of `e`, multiplied by gain and 1/Ti afterwards: a change "
-            "counts for the whole sum, and bumps (specs/equations.md, section 6)."
+            "come. The sum of `e/Ti`, multiplied by the gain afterwards, or of `e`, multiplied by gain and 1/Ti afterwards: a "
+            "change counts for the whole sum, and bumps (specs/equations.md, section 6)."
         ),
         PerScan(),
     ] = "ki e"

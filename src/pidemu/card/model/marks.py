@@ -152,10 +152,8 @@ def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
     changed: dict[str, Any] = {}
     for name in fields_of(type(tree)):
         value = getattr(tree, name)
-        if name in marks:
-            new = marks[name].neutral
-        else:
-            new = without(value, kind) if _is_part(value) else value
+        inner = without(value, kind) if _is_part(value) else value
+        new = marks[name].neutral if name in marks else inner
         if new is not value and new != value:
             changed[name] = new
     return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[type-var]

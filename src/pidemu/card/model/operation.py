@@ -90,8 +90,8 @@ class Action(Part):
         Literal["sp - pv", "pv - sp"],
         means(
             "The error of a reverse-acting controller with positive gain, as the vendor writes it. `pv - sp` means the "
-            "vendor writes the direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises all "
-            "the same."
+            "vendor writes the direct-acting equation and changes the sign elsewhere; the output falls when the measurement rises "
+            "all the same."
         ),
     ] = "sp - pv"
     names: Annotated[

@@ -111,7 +111,7 @@ class Setpoint(Part, Generic[R]):
 
     @property
     def fall(self) -> R | None:
-        """Fastest fall of an algorithm's setpoint: that of any change, unless the card says otherwise; ``None`` where it is free."""
+        """Fastest fall of an algorithm's setpoint: as any change, unless the card says otherwise; ``None``: no limit."""
         found = self.rate if self.rate_down is None else self.rate_down
         return None if found == math.inf else found
 

@@ -45,9 +45,9 @@ class Transfer(Part):
         Literal["none", "output", "integral", "initial"],
         means(
             "What a user can set by hand for the transfer. `none`: no source says that there is such a thing. `output`, "
-            "with `load-output`: the value that is loaded, which may be another than the last output. `integral`, with `keep`, `zero` "
-            "and `running`: what the integral holds (`integral.holds`), at any time. `initial`, with these: the same, before the first "
-            "scan of all only."
+            "with `load-output`: the value that is loaded, which may be another than the last output. `integral`, with `keep`, "
+            "`zero` and `running`: what the integral holds (`integral.holds`), at any time. `initial`, with these: the same, "
+            "before the first scan of all only."
         ),
     ] = "none"
     derivative: Annotated[
