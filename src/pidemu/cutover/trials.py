@@ -156,9 +156,8 @@ def proportional(ctl: Controller, bench: Bench, sp: float) -> float:
 
 def _preset(bench: Bench, state: Mapping[str, float], integral: float) -> dict[str, float]:
     """Return the states that go with an integral that is set: what the algorithm knows of its output is the output."""
-    preset: dict[str, float] = {StateRole.INTEGRAL: integral} | {
-        name: bench.op for name in (StateRole.OWN_OUTPUT, StateRole.INNER_SUM) if name in state
-    }
+    preset: dict[str, float] = {name: bench.op for name in (StateRole.OWN_OUTPUT, StateRole.INNER_SUM) if name in state}
+    preset[StateRole.INTEGRAL] = integral
     if bench.a.transfer.way.clears:  # set after the transfer has cleared it, and the derivative with it
         preset |= {StateRole.MODE: 1.0}
         if bench.a.transfer.derivative == "zeroed":
