@@ -70,6 +70,7 @@ Mark = TypeVar("Mark", bound=Names | Beyond | AtRest | PerScan)
 Tree = TypeVar("Tree")
 _fields: dict[type[Any], dict[str, FieldInfo]] = {}
 _marks: dict[tuple[type[Any], type[Any]], dict[str, Any]] = {}
+_ways: dict[tuple[type[Any], type[Any]], tuple[tuple[str, Any, bool], ...]] = {}
 
 
 def fields_of(part: type[Any]) -> dict[str, FieldInfo]:
@@ -98,10 +99,6 @@ def parts_in(annotation: Any) -> list[type[Any]]:
     return [part for argument in typing.get_args(annotation) for part in parts_in(argument)]
 
 
-def _is_part(value: object) -> bool:
-    return dataclasses.is_dataclass(value)
-
-
 def marked(part: type[Any], kind: type[Mark]) -> dict[str, Mark]:
     """Return the fields of a part that bear a mark of that kind, and the mark.
 
@@ -128,14 +125,13 @@ def walk(tree: Any, kind: type[Mark]) -> Iterator[tuple[tuple[str, ...], Any, Ma
     kind : type
         `Names`, `Beyond`, `AtRest` or `PerScan`.
     """
-    marks = marked(type(tree), kind)
-    for name in fields_of(type(tree)):
-        if name in marks:
-            yield (name,), tree, marks[name]
-        value = getattr(tree, name)
-        if _is_part(value):
-            for inner, owner, mark in walk(value, kind):
-                yield (name, *inner), owner, mark
+    for name, mark, is_above in _way(type(tree), kind):
+        if mark is not None:
+            yield (name,), tree, mark
+        value = getattr(tree, name) if is_above else None
+        if value is not None:
+            for inner, owner, found in walk(value, kind):
+                yield (name, *inner), owner, found
 
 
 def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
@@ -148,12 +144,23 @@ def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
     kind : type
         `Beyond` or `AtRest`.
     """
-    marks: dict[str, Any] = marked(type(tree), kind)
     changed: dict[str, Any] = {}
-    for name in fields_of(type(tree)):
+    for name, mark, _ in _way(type(tree), kind):
         value = getattr(tree, name)
-        inner = without(value, kind) if _is_part(value) else value
-        new = marks[name].neutral if name in marks else inner
+        new = mark.neutral if mark is not None else None if value is None else without(value, kind)
         if new is not value and new != value:
             changed[name] = new
     return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[type-var]
+
+
+def _way(part: type[Any], kind: type[Any]) -> tuple[tuple[str, Any, bool], ...]:
+    """Return the fields that have a mark of a kind or are above one: name, mark, and whether there can be some below."""
+    if (part, kind) not in _ways:
+        marks = marked(part, kind)
+        found = []
+        for name, field in fields_of(part).items():
+            is_above = any(_way(inner, kind) for inner in parts_in(field.annotation))
+            if is_above or name in marks:
+                found.append((name, marks.get(name), is_above))
+        _ways[part, kind] = tuple(found)
+    return _ways[part, kind]
