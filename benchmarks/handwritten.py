@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 import pidemu
-from pidemu.algorithm.model import Gate
 from pidemu.backends.native import compiler
+from pidemu.card.windup import Scheme
+from pidemu.card.windup.conditional import WindupConditional
 from pidemu.program.builder import build
 from pidemu.program.ir import Program
 from pidemu.program.specialise import specialise
@@ -43,9 +44,9 @@ class Numbers:
 def program(numbers: Numbers = Numbers()) -> Program:
     """Return the closed loop as a program that reads setpoint and load."""
     dials = {"kp": numbers.kp, "ki": numbers.ki, "kd": numbers.kd, "Tf": numbers.Tf, "b": 1, "c": 0}
-    algorithm = replace(
-        pidemu.load_card("generic/parallel").settings(dials).algorithm(), windup="conditional", gate=Gate(drops=True)
-    )
+    algorithm = pidemu.load_card("generic/parallel").settings(dials).algorithm()
+    windup: Scheme[float] = WindupConditional(scheme="conditional", last_increment="dropped")
+    algorithm = replace(algorithm, integral=replace(algorithm.integral, windup=windup))
     controller = build(algorithm, H, limits=(0.0, 100.0))
     at_rest = {"u": 50.0, "I": 50.0, "x1": 50.0, "on": 1.0, "begun": 1.0}
     controller = replace(controller, initial=tuple(at_rest.get(q.name, 0.0) for q in controller.states))

@@ -65,7 +65,7 @@ def history(seed: int, a: Algorithm | None = None, n: int = 80) -> History:
         "track": np.where(spells(0.15), rng.uniform(5, 95, n), math.nan),
         "hold": (rng.uniform(size=n) < 0.08).astype(float),
     }
-    if a is not None and a.windup == "external-reset":
+    if a is not None and a.integral.windup.scheme == "external-reset":
         columns["external_reset"] = np.where(spells(0.4), rng.uniform(0, 100, n), math.nan)
     if a is not None and a.feedforward is not None:
         columns["feedforward"] = np.where(spells(0.6), rng.uniform(-5, 5, n), math.nan)

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.algorithm.model import Algorithm
 from pidemu.backends import python
 from pidemu.backends.c import header, single, source
 from pidemu.card.library import card_files
 from pidemu.errors import EngineError
 from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Binary, Expr, Floor, Line, Name, Number, Operator, Program, Quantity, Select, select
+from tests.algorithms import EXTERNAL_RESET, algorithm
 from tests.backends.c_compiler import CPP, FLAGS, WARNINGS, Loop, compiled, needs_compiler, needs_cpp, refused
 from tests.helpers import Floats
 
@@ -123,7 +123,7 @@ def test_so_it_does_with_every_optimisation(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_all_signals_that_a_program_can_read_are_arguments(tmp_path: Path, precision: Any) -> None:
-    a = Algorithm(False, 2.0, 0.1, 1.0, Tf=0.5, windup="external-reset", precision=precision)
+    a = algorithm(kp=2.0, ki=0.1, kd=1.0, Tf=0.5, windup=EXTERNAL_RESET, arithmetic__type=precision)
     program = build(a, 0.5, signals=("cascade", "track", "reset", "feedforward"))
     assert len(program.inputs) == 8
     check(program, Loop(compiled(tmp_path, single(program, "pid")), "pid", program), 1)

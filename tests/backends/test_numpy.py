@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.algorithm.model import Algorithm
 from pidemu.backends import numpy as target
 from pidemu.backends import python
 from pidemu.checks.runs import plausible
@@ -22,6 +21,7 @@ from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Binary, Expr, Floor, Line, Name, Number, Program, Quantity, select
 from pidemu.program.specialise import specialise
 from pidemu.simulation.closed import closed_loop
+from tests.algorithms import EXTERNAL_RESET, algorithm
 from tests.helpers import Floats
 
 _LOOPS = 7
@@ -138,8 +138,8 @@ def test_every_card_gives_the_bits_of_plain_python(card_id: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_cascade_tracking_external_reset_and_feedforward_give_the_bits_of_plain_python(precision: Any) -> None:
-    algorithm = Algorithm(False, 1.3, 0.2, 0.5, b=0.4, Tf=0.3, windup="external-reset", precision=precision)
-    check_both(build(algorithm, 0.1, signals=("cascade", "track", "reset", "feedforward")))
+    a = algorithm(kp=1.3, ki=0.2, kd=0.5, b=0.4, Tf=0.3, windup=EXTERNAL_RESET, arithmetic__type=precision)
+    check_both(build(a, 0.1, signals=("cascade", "track", "reset", "feedforward")))
 
 
 @pytest.mark.parametrize("loops", [1, 2, 64])
@@ -299,7 +299,7 @@ def test_one_loop_over_a_record_gives_the_bits_of_plain_python_and_leaves_its_st
 
 
 def test_one_loop_in_single_precision_leaves_numbers_of_single_precision() -> None:
-    program = build(Algorithm(False, 1.3, 0.2, 0.5, Tf=0.3, precision="float32"), 0.1)
+    program = build(algorithm(kp=1.3, ki=0.2, kd=0.5, Tf=0.3, arithmetic__type="float32"), 0.1)
     signals = list(record(program, 0))
     ends: list[list[Any]] = []
     for made in (python.runner(program), target.runner(program)):

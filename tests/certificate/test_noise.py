@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 import pidemu
-from pidemu.algorithm.model import Lag
+from pidemu.card.model.signals import SignalFilter
 from pidemu.certificate.noise import noise_change, noise_gain, noise_gain_of
 from pidemu.law.law import Law
 
@@ -57,7 +56,7 @@ def test_above_the_corner_of_a_filter_that_lets_nothing_through_it_is_the_gain_t
     """An I controller behind a PV filter of 2 s: ki/w at the corner, 0.5 rad/s, less 3 dB."""
     s = settings("generic/parallel", kp=0, ki=0.3)
     filtered = s.algorithm()
-    law = Law(replace(filtered, pv_filter=Lag(2.0)))
+    law = Law(filtered.filtered(SignalFilter(time=2.0)))
     assert noise_gain_of(law) == pytest.approx(0.3 / 0.5 / math.sqrt(2), rel=1e-12)
 
 

@@ -21,6 +21,7 @@ from pidemu.certificate.trials import Bench, Plan
 from pidemu.records.sampling import limits_for
 from pidemu.records.standard import scale_of, standard_record
 from pidemu.settings.settings import Settings
+from tests.algorithms import NONE
 from tests.checks.bench import VALID, edited, written
 from tests.conversion.usual import CARDS, SOURCES
 from tests.helpers import Floats
@@ -106,12 +107,12 @@ def test_schemes_of_different_names_that_behave_alike_have_no_difference() -> No
     target = settings("emerson/deltav", GAIN=2.0, RESET=60, ARW_HI_LIM=95, ARW_LO_LIM=5)
     for s in (source, target):
         np.testing.assert_allclose(excursion(s, 60.0, 4.0, 1.0)[0], excursion(source, 60.0, 4.0, 1.0)[0], rtol=0, atol=1e-9)
-    assert source.algorithm().gate != target.algorithm().gate
+    assert source.algorithm().integral.windup != target.algorithm().integral.windup
     assert "windup" not in differences(source, target)
     velocity, recomputed = settings("yokogawa/fieldbus-pid", GAIN=2, RESET=60), settings("allen-bradley/pide", PGain=2, IGain=2)
     assert "windup" not in differences(velocity, recomputed)
     conditional, other = settings("mathworks/pid2", Kp=2, Ki=2 / 60), settings("iec/61131-3-pid", KP=-2, TR=60)
-    assert conditional.algorithm().windup == other.algorithm().windup == "none"
+    assert conditional.algorithm().integral.windup == other.algorithm().integral.windup == NONE
     assert "windup" not in differences(conditional, other)
 
 

@@ -214,7 +214,8 @@ def test_a_card_whose_transfer_is_bumpless_does_not_bump(name: str, data: st.Dat
     ctl = Controller(chosen, h, output_limits=(0, 100), initial_output=50.0)
     history(seed, a).run(ctl)
     # I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest; whole counts; 24 bits
-    allowed = {"float64": 1e-12 * terms(a, h), "float32": 1e-6 * terms(a, h), "integer": 1.0 / a.counts}[a.arithmetic.type]
+    counts = a.arithmetic.counts or 1
+    allowed = {"float64": 1e-12 * terms(a, h), "float32": 1e-6 * terms(a, h), "integer": 1.0 / counts}[a.arithmetic.type]
     automatic = ("to automatic", "to cascade")
     entered = [e for e in ctl.events if e.text.endswith(automatic) and not e.text.startswith(("automatic", "cascade"))]
     assert [e for e in entered if abs(e.bump) > allowed] == []

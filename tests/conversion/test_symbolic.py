@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from pidemu.algorithm.model import Algorithm
 from pidemu.card.load import Card
 from pidemu.card.model.base import Rule
 from pidemu.law.law import Law
+from tests.algorithms import changed
 from tests.helpers import made_up_card
 
 Expr = Any
@@ -503,8 +504,8 @@ def test_the_code_expands_the_sampled_and_held_law_of_every_rule(integral: Rule,
     for seed in RNG_SEEDS:
         at = values(seed, kp, ki, kd, Tf, h)
         at[Tf] += at[h]  # the forward rule is stable for Tf > h/2 only
-        a = replace(plain(at), integral_rule=integral, derivative_rule=derivative)
-        a = replace(a, Tf=0.0) if derivative is Rule.FOUR_POINT else a  # which has no filter
+        a = changed(plain(at), integral__rule=integral, derivative__rule=derivative)
+        a = changed(a, Tf=0.0) if derivative is Rule.FOUR_POINT else a  # which has no filter
         exact = [numbers(e, {**at, KEPT: math.exp(-at[h] / at[Tf])}) for e in wanted]
         # what stays of sums of kp h^k/k! and kd h^k terms with both signs
         assert Law(a, at[h]).held_expansion(5) == pytest.approx(exact, rel=1e-9, abs=1e-11)
@@ -515,7 +516,7 @@ def test_the_code_has_the_increments_of_the_table(rule: Rule) -> None:
     row = next(row for row in table("| integral rule | q0 |") if row[0] == rule.value)
     for seed in RNG_SEEDS:
         at = values(seed, kp, ki, kd, h)
-        found = Law(replace(plain(at), integral_rule=rule), at[h]).impulse(6)
+        found = Law(changed(plain(at), integral__rule=rule), at[h]).impulse(6)
         steps = np.diff(found, prepend=0.0)
         assert steps == pytest.approx([*(numbers(read(cell), at) for cell in row[1:4]), 0, 0, 0], abs=1e-12)
 

@@ -96,7 +96,7 @@ def wait(plan: TransferPlan) -> int:
 def followed(plan: TransferPlan, s: Settings, scans: int = 3, output_limits: tuple[float, float] = WIDE) -> list[float]:
     """The first automatic outputs where a technician does what the steps say, no more; signals in the controller's own units."""
     a, given = s.algorithm(), numbers(plan)
-    sp, start = given.get("SP", PV), a.start
+    sp, start = given.get("SP", PV), a.transfer.start
     ctl = Controller(s, output_limits=output_limits, bias=given.get("bias", 0.0), initial_output=OP)
     ctl.scan(20.0, PV, auto=False, manual=given.get("manual entry", OP))  # the setpoint was another one before
     u = ctl.run(sp, [PV] * wait(plan), auto=False, manual=given.get("manual entry", OP))[-1]
@@ -115,11 +115,10 @@ def followed(plan: TransferPlan, s: Settings, scans: int = 3, output_limits: tup
 def increment(s: Settings, e: float) -> float:
     """What the integral adds per scan, ``ki h S(e)`` (specs/equations.md, sections 4 and 8)."""
     a, size = s.algorithm(), abs(e)
-    if a.error is not None and a.error.on_integral:
-        gap = a.error.gain if size <= a.error.band else 1.0
-        e *= {"gap": gap, "squared": size / 100, "gain-linear": a.error.linearity + (1 - a.error.linearity) * size / 100}[
-            a.error.kind
-        ]
+    if a.shapes_integral:
+        band, L = a.error.band or 0.0, 1.0 if a.error.linearity is None else a.error.linearity
+        gap = a.error.gain if size <= band else 1.0
+        e *= {"gap": gap, "squared": size / 100, "gain-linear": L + (1 - L) * size / 100}[a.error.shape]
     return a.ki * Controller(s).interval * e
 
 

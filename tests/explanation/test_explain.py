@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,11 @@ import pytest
 import pidemu
 from pidemu.card.library import card_files
 from pidemu.card.model.card_file import default_scan
+from pidemu.card.model.signals import Measurement
 from pidemu.errors import ScanError
 from pidemu.explanation.forms import Times
 from pidemu.law.law import Law
+from tests.algorithms import changed
 from tests.cli.helpers import strict_json
 
 EXAMPLES = [(i, e.given) for i in card_files() for e in pidemu.load_card(i).data.examples]
@@ -34,7 +35,7 @@ def test_every_form_is_the_law(card: str, given: dict[str, Any]) -> None:
     if e.forms is None:
         assert a.dahlin is not None
         return
-    bare = replace(a, sp_filter=None, pv_filter=None, e_filter=None, previous_pv=False)
+    bare = changed(a, setpoint__filter=None, measurement=Measurement(), error__filter=None)
     law, s = Law(bare).response(W), 1j * W
     lag = 1 + a.Tf * s + (a.Tf * s) ** 2 / 2 if a.filter_order == 2 else 1 + a.Tf * s
     D, all_behind = (s / lag, np.ones_like(s)) if e.forms.term_filter else (s, lag if a.has_signal_filter else np.ones_like(s))

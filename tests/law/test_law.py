@@ -17,10 +17,11 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.algorithm.model import Algorithm, Place
 from pidemu.card.load import Card
-from pidemu.card.model.base import GENERAL_RULES, Rule
+from pidemu.card.model.base import GENERAL_RULES, Form, Rule
 from pidemu.errors import ScanError
 from pidemu.law.law import Law
 from pidemu.settings.settings import Settings
+from tests.algorithms import algorithm, filter_at
 from tests.helpers import made_up_card, scans_of, settings_of
 
 Block = Any
@@ -271,16 +272,16 @@ def test_coefficients_and_moments_of_a_standard_card_with_its_own_filter_time_ar
 
 
 def test_the_setpoint_kick_of_a_series_controller_with_derivative_on_the_measurement_is_its_gain() -> None:
-    law = Law(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, c=0.0, Tf=1.0))
+    law = Law(algorithm(form=Form.SERIES, kp=2.0, ki=0.1, kd=6.0, c=0.0, Tf=1.0))
     assert law.kick() == 2.0
-    with_weight = Law(Algorithm(series=True, kp=2.0, ki=0.1, kd=6.0, b=0.25, c=0.0, Tf=1.0))
+    with_weight = Law(algorithm(form=Form.SERIES, kp=2.0, ki=0.1, kd=6.0, b=0.25, c=0.0, Tf=1.0))
     assert with_weight.kick() == 0.5
 
 
 def test_the_setpoint_kick_of_a_filtered_derivative_on_error_is_finite_and_of_an_unfiltered_one_infinite() -> None:
-    assert Law(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0, Tf=1.5)).kick() == 2.0 + 6.0 / 1.5
-    assert math.inf == Law(Algorithm(series=False, kp=2.0, ki=0.1, kd=6.0)).kick()
-    assert -math.inf == Law(Algorithm(series=False, kp=-2.0, ki=-0.1, kd=-6.0)).kick()
+    assert Law(algorithm(kp=2.0, ki=0.1, kd=6.0, Tf=1.5)).kick() == 2.0 + 6.0 / 1.5
+    assert math.inf == Law(algorithm(kp=2.0, ki=0.1, kd=6.0)).kick()
+    assert -math.inf == Law(algorithm(kp=-2.0, ki=-0.1, kd=-6.0)).kick()
 
 
 # --- the discrete law ------------------------------------------------------------------------------------------------
@@ -356,19 +357,17 @@ def test_the_discrete_law_is_that_of_the_difference_equations(
     h: float,
     part: float,
 ) -> None:
-    a = Algorithm(
-        series=series,
+    a = algorithm(
+        form=Form.SERIES if series else Form.STANDARD,
         kp=x.k or float(series),
         ki=x.i,
         kd=x.d,
         b=x.b,
         c=x.c,
         Tf=x.filt * 10 * h,
-        filter_on=place,
-        filter_order=order,
-        integral_rule=integral,
-        derivative_rule=derivative,
-        filter_rule=filt,
+        integral__rule=integral,
+        derivative__rule=derivative,
+        derivative__filter=filter_at(place, order, filt),
     )
     forward = (derivative if place == "term" else filt) is Rule.FORWARD
     assume(not forward or not a.Tf or a.Tf > h)
@@ -405,7 +404,7 @@ def test_the_discrete_law_of_every_card_tends_to_its_continuous_law(name: str, d
 @given(x=numbers, h=st.floats(0.05, 1), angle=st.floats(1e-7, 1e-3), rule=st.sampled_from(GENERAL_RULES))
 def test_the_discrete_law_is_accurate_at_the_slow_end_of_the_loop_band(x: Numbers, h: float, angle: float, rule: Rule) -> None:
     # the band begins at 0.01/Ti: with Ti = 1000 s and h = 0.1 s that is 1e-6 rad per scan
-    a = Algorithm(series=False, kp=1.0, ki=x.i / 1000, kd=x.d, Tf=x.filt + h, derivative_rule=rule)
+    a = algorithm(kp=1.0, ki=x.i / 1000, kd=x.d, Tf=x.filt + h, derivative__rule=rule)
     q = np.exp(-1j * angle)
     one = -np.expm1(-1j * angle)  # 1 - q, without cancellation
     s = {Rule.BACKWARD: one / h, Rule.FORWARD: one / (h * q), Rule.TRAPEZOIDAL: 2 / h * one / (1 + q)}[rule]
@@ -434,7 +433,7 @@ def test_the_impulse_response_of_every_card_transforms_to_its_discrete_law(
 
 @pytest.mark.parametrize("Tf", [0.1, 0.5])
 def test_an_unstable_forward_filter_is_refused_with_the_interval_that_would_do(Tf: float) -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0, Tf=Tf, derivative_rule=Rule.FORWARD)
+    a = algorithm(kp=1.0, ki=0.1, kd=2.0, Tf=Tf, derivative__rule=Rule.FORWARD)
     with pytest.raises(ScanError, match=f"use a scan interval below {2 * Tf:g} s or no filter"):
         Law(a, scan=1.0)
 
@@ -442,11 +441,11 @@ def test_an_unstable_forward_filter_is_refused_with_the_interval_that_would_do(T
 @pytest.mark.parametrize("scan", [0.0, -1.0, math.nan, math.inf])
 def test_a_scan_interval_must_be_a_positive_number(scan: float) -> None:
     with pytest.raises(ScanError, match="is not a positive number"):
-        Law(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0), scan=scan)
+        Law(algorithm(kp=1.0, ki=0.1, kd=2.0), scan=scan)
 
 
 def test_each_law_refuses_what_belongs_to_the_other() -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0)
+    a = algorithm(kp=1.0, ki=0.1, kd=2.0)
     with pytest.raises(ValueError, match="the continuous law has no samples"):
         Law(a).impulse(3)
     discrete: Law = Law(a, scan=1.0)
@@ -458,4 +457,4 @@ def test_each_law_refuses_what_belongs_to_the_other() -> None:
 
 def test_a_path_that_is_not_there_is_refused() -> None:
     with pytest.raises(ValueError, match="it is 'feedback' or 'setpoint'"):
-        Law(Algorithm(series=False, kp=1.0, ki=0.1, kd=2.0)).response(1.0, "both")  # type: ignore[arg-type]
+        Law(algorithm(kp=1.0, ki=0.1, kd=2.0)).response(1.0, "both")  # type: ignore[arg-type]

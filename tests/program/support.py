@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pidemu.algorithm.model import Algorithm, Lag
+from pidemu.algorithm.model import Algorithm
 from pidemu.backends.python import compiled
 from pidemu.card.model.base import Rule
+from pidemu.card.model.signals import SignalFilter
 from pidemu.program.ir import Program
 from tests.helpers import Floats
 
@@ -34,20 +35,20 @@ def states_of(program: Program, sp: Floats, pv: Floats, *names: str) -> list[Flo
     return list(np.array(rows).T)
 
 
-def lagged(x: Floats, f: Lag | None, h: float) -> Floats:
+def lagged(x: Floats, f: SignalFilter[float] | None, h: float) -> Floats:
     """A first-order lag that starts in the steady state of the first sample."""
     if f is None:
         return x
-    out = [float(x[0])]
+    out, Tf = [float(x[0])], f.time or 0.0
     for new, old in zip(x[1:].tolist(), x[:-1].tolist(), strict=True):
-        if f.factor != 1:
+        if f.factor is not None:
             out.append(out[-1] + f.factor * (new - out[-1]))
         elif f.rule is Rule.BACKWARD:
-            out.append((f.time * out[-1] + h * new) / (f.time + h))
+            out.append((Tf * out[-1] + h * new) / (Tf + h))
         elif f.rule is Rule.FORWARD:
-            out.append(out[-1] + h / f.time * (old - out[-1]))
+            out.append(out[-1] + h / Tf * (old - out[-1]))
         else:
-            out.append(((2 * f.time - h) * out[-1] + h * (new + old)) / (2 * f.time + h))
+            out.append(((2 * Tf - h) * out[-1] + h * (new + old)) / (2 * Tf + h))
     return np.array(out)
 
 

@@ -20,13 +20,15 @@ from pidemu.backends.python import source
 from pidemu.card.model.base import Rule
 from pidemu.errors import ScanError
 from pidemu.program.builder import build
+from tests.algorithms import NONE, VELOCITY, algorithm, changed, incremental
 from tests.helpers import Floats, made_up_card, outputs
 from tests.program.support import signals, states_of
 
 f32 = np.float32
 H, U0 = 0.1, 40.3
 """Numbers that neither float32 nor float64 holds exactly."""
-PID = Algorithm(series=False, kp=2.1, ki=0.37, kd=1.3, Tf=0.7, precision="float32")
+PID = algorithm(kp=2.1, ki=0.37, kd=1.3, Tf=0.7, arithmetic__type="float32")
+FOUR_POINT = algorithm(kd=1.3, derivative__rule=Rule.FOUR_POINT, arithmetic__type="float32")
 FLOAT32: dict[str, Any] = {"arithmetic": {"type": "float32"}}
 
 seeds = st.integers(0, 2**32 - 1)
@@ -82,8 +84,8 @@ def by_hand_trapezoidal(sp: Floats, pv: Floats) -> list[float]:
 
 CASES: dict[str, tuple[Algorithm, Callable[[Floats, Floats], list[float]]]] = {
     "positional": (PID, by_hand_positional),
-    "velocity": (replace(PID, velocity=True, windup="velocity"), by_hand_velocity),
-    "trapezoidal": (replace(PID, kd=0.0, Tf=0.0, integral_rule=Rule.TRAPEZOIDAL), by_hand_trapezoidal),
+    "velocity": (incremental(PID), by_hand_velocity),
+    "trapezoidal": (changed(PID, kd=0.0, Tf=0.0, integral__rule=Rule.TRAPEZOIDAL), by_hand_trapezoidal),
 }
 
 
@@ -97,25 +99,25 @@ def test_every_operation_of_a_float32_program_is_rounded(name: str, seed: int) -
     assert by_hand(sp, pv) != outputs(replace(program, precision="float64"), sp, pv).tolist()
 
 
-@pytest.mark.parametrize("wide", [False, True], ids=["float32", "float64"])
+@pytest.mark.parametrize("literals", ["float32", "float64"])
 @given(seed=seeds)
-def test_a_literal_has_the_width_that_the_card_says(wide: bool, seed: int) -> None:
+def test_a_literal_has_the_width_that_the_card_says(literals: str, seed: int) -> None:
     """The 3 of the four-point rule: beside a float64 literal the operation is float64, until it is stored."""
-    a = Algorithm(False, 0.0, 0.0, 1.3, derivative_rule=Rule.FOUR_POINT, precision="float32", wide_literals=wide)
+    a = changed(FOUR_POINT, arithmetic__literals=literals)
     sp, pv = signals(seed, 60)
     g, e = f32(1.3 / (10 * H)), [r - y for r, y in narrow(sp, pv)]
     expected = []
     for n in range(60):
         x0, x1, x2, x3 = (e[max(n - k, 0)] for k in range(4))
-        three = np.float64(3) if wide else f32(3)
+        three = np.float64(3) if literals == "float64" else f32(3)
         expected.append(float(f32(g * (three * (x0 - x3) + x1 - x2))))
     assert expected == outputs(build(a, H, limits=(-1e9, 1e9)), sp, pv).tolist()
 
 
 def test_the_two_widths_of_a_literal_differ_on_these_signals() -> None:
-    a = Algorithm(False, 0.0, 0.0, 1.3, derivative_rule=Rule.FOUR_POINT, precision="float32")
     sp, pv = signals(1, 60)
-    one, other = (outputs(build(replace(a, wide_literals=w), H, limits=(-1e9, 1e9)), sp, pv) for w in (False, True))
+    both = [changed(FOUR_POINT, arithmetic__literals=literals) for literals in ("float32", "float64")]
+    one, other = (outputs(build(a, H, limits=(-1e9, 1e9)), sp, pv) for a in both)
     assert np.count_nonzero(one != other) > 5
 
 
@@ -132,7 +134,7 @@ def test_limits_that_float32_does_not_hold_are_the_nearest_inside_them(limits: t
 
 def far_integral(precision: Any, e: float) -> Floats:
     """The integral over 2000 scans of 0.05 s with Ti = 5000 s and K = 1, from 50: 1e-5 e per scan."""
-    a = Algorithm(series=False, kp=1.0, ki=1 / 5000, kd=0.0, precision=precision)
+    a = algorithm(kp=1.0, ki=1 / 5000, arithmetic__type=precision)
     sp = np.full(2000, 50.0 + e)
     (I,) = states_of(build(a, 0.05, initial_output=50.0 + e), sp, 0 * sp + 50.0, "I")  # noqa: E741
     return np.asarray(I)
@@ -203,23 +205,23 @@ def test_float32_signals_overflow_quietly_scan_after_scan_as_in_a_run(value: flo
     assert [repr(u) for u in once.run(50.0, pv).tolist()] == [repr(often.scan(50.0, y)) for y in pv]
 
 
-@pytest.mark.parametrize("wide", [False, True], ids=["float32", "float64"])
-def test_the_printed_module_of_a_float32_program_runs_on_its_own(wide: bool) -> None:
-    a = replace(PID, Tf=0.0, derivative_rule=Rule.FOUR_POINT, wide_literals=wide)
+@pytest.mark.parametrize("literals", ["float32", "float64"])
+def test_the_printed_module_of_a_float32_program_runs_on_its_own(literals: str) -> None:
+    a = changed(PID, Tf=0.0, derivative__rule=Rule.FOUR_POINT, arithmetic__literals=literals)
     program = build(a, H, initial_output=U0)
     sp, pv = signals(3, 40)
     more = f"\nprint(list(map(float, run(list(INITIAL), {sp.tolist()}, {pv.tolist()}, [1.0] * 40, [0.0] * 40))))\n"
     done = subprocess.run([sys.executable, "-I", "-"], input=source(program) + more, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == repr(outputs(program, sp, pv).tolist())
-    assert ("float64(3.0)" in source(program)) == wide
+    assert ("float64(3.0)" in source(program)) == (literals == "float64")
 
 
 # --- whole numbers ---------------------------------------------------------------------------------------------------
 
-COUNTS = Algorithm(
-    series=False, kp=1.5, ki=1.5 / 60, kd=0.0, c=0.0, velocity=True, windup="velocity", precision="integer", counts=10,
-    gain_counts=100,
+COUNTS = algorithm(
+    kp=1.5, ki=1.5 / 60, c=0.0, windup=VELOCITY, arithmetic__type="integer", arithmetic__counts=10, arithmetic__gain_counts=100,
 )  # fmt: skip
+POSITIONAL_COUNTS = changed(COUNTS, implementation="positional", integral__windup=NONE)
 TICKS = 10_000
 
 
@@ -247,7 +249,7 @@ def test_without_the_remainders_a_small_error_would_never_move_the_output() -> N
 @given(seed=seeds)
 def test_nothing_of_the_derivative_is_lost_to_rounding(seed: int) -> None:
     """``(h + Tf) D`` and its remainder are what came in, ``Td`` times the fall of the measurement, less what ``-h D`` took out."""
-    a = replace(COUNTS, ki=0.0, kd=1.5 * 7, Tf=3.0)
+    a = changed(COUNTS, ki=0.0, kd=1.5 * 7, Tf=3.0)
     y = np.cumsum(np.random.default_rng(seed).integers(-5, 6, 2000)) + 500
     D, rest = (x.astype(np.int64) for x in states_of(build(a, 0.1, limits=(-1e6, 1e6)), np.zeros(2000), y / 10, "D", "Dr"))
     h, Td, Tf = TICKS // 10, 7 * TICKS, 3 * TICKS
@@ -259,12 +261,16 @@ def test_nothing_of_the_derivative_is_lost_to_rounding(seed: int) -> None:
 @pytest.mark.parametrize(
     ("a", "h", "message"),
     [
-        (replace(COUNTS, kp=1.505), 0.1, "the gain is not a whole number of counts"),
+        (changed(COUNTS, kp=1.505), 0.1, "the gain is not a whole number of counts"),
         (COUNTS, 0.00015, "the scan interval of 0.00015 s is not a whole number of 0.0001 s"),
-        (replace(COUNTS, ki=1.5 / 60.00005), 0.1, "the integral time of 60.0001 s is not a whole number"),
-        (replace(COUNTS, kp=1e15, ki=0.0), 0.1, "the gain is too large for whole numbers"),
-        (replace(COUNTS, b=0.0), 0.1, "integer arithmetic is defined for velocity PID in standard form"),
-        (replace(COUNTS, velocity=False, windup="none"), 0.1, "integer arithmetic is defined for velocity PID in standard form"),
+        (changed(COUNTS, ki=1.5 / 60.00005), 0.1, "the integral time of 60.0001 s is not a whole number"),
+        (changed(COUNTS, kp=1e15, ki=0.0), 0.1, "the gain is too large for whole numbers"),
+        (changed(COUNTS, b=0.0), 0.1, "integer arithmetic is defined for velocity PID in standard form"),
+        (
+            changed(COUNTS, implementation="positional", integral__windup=NONE),
+            0.1,
+            "integer arithmetic is defined for velocity PID in standard form",
+        ),
     ],
 )
 def test_what_whole_numbers_cannot_hold_is_refused(a: Algorithm, h: float, message: str) -> None:

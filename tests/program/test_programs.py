@@ -13,25 +13,42 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.algorithm.model import Algorithm, Gate, Place, Scheme
+from pidemu.algorithm.model import Algorithm, Place
 from pidemu.backends.expressions import render
 from pidemu.backends.python import compiled, source
 from pidemu.card.load import variants
-from pidemu.card.model.base import GENERAL_RULES, Rule
+from pidemu.card.model.base import GENERAL_RULES, Form, Rule
 from pidemu.card.references import is_active
+from pidemu.card.windup import Scheme
+from pidemu.card.windup.back_calculation import WindupBackCalculation
+from pidemu.card.windup.conditional import WindupConditional
 from pidemu.checks.runs import working
 from pidemu.errors import ScanError
 from pidemu.law.law import Law
 from pidemu.program.builder import build
 from pidemu.program.ir import Binary, Expr, Name, Number, Operator, Program, Select
 from pidemu.settings.settings import limits
+from tests.algorithms import (
+    CLAMP,
+    CLAMP_SUM,
+    CONDITIONAL,
+    EXTERNAL_RESET,
+    FREEZE,
+    NONE,
+    VELOCITY,
+    algorithm,
+    back_calculation,
+    changed,
+    filter_at,
+    incremental,
+)  # fmt: skip
 from tests.helpers import WIDE, Floats, outputs, scans_of, settings_of
 
 PATHS: tuple[Literal["feedback"], Literal["setpoint"]] = ("feedback", "setpoint")
 FILTERS: tuple[tuple[Place, Literal[1, 2]], ...] = (("term", 1), ("measurement", 1), ("measurement", 2), ("output", 1))
-POSITIONAL_SCHEMES: tuple[Scheme, ...] = (
-    "none", "clamp", "clamp-sum", "freeze", "conditional", "back-calculation", "external-reset",
-)  # fmt: skip
+POSITIONAL_SCHEMES: dict[str, Scheme[float]] = {
+    scheme.scheme: scheme for scheme in (NONE, CLAMP, CLAMP_SUM, FREEZE, CONDITIONAL, back_calculation(20.0), EXTERNAL_RESET)
+}
 
 on_every_card = pytest.mark.parametrize("name", pidemu.cards())
 
@@ -73,34 +90,33 @@ weights = st.sampled_from([0.0, 1.0]) | st.floats(0.01, 1)
 
 
 @st.composite
-def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: Scheme | None = None) -> Algorithm:
+def algorithms(draw: st.DrawFn, *, h: float = 1.0, windup: str | None = None) -> Algorithm:
     """Any algorithm that is stable at this scan interval, positional."""
     place, order = draw(st.sampled_from(FILTERS))
     kp = draw(gains)
     series = draw(st.booleans()) and kp != 0
-    scheme: Scheme = windup if windup is not None else draw(st.sampled_from(POSITIONAL_SCHEMES))
+    scheme = windup if windup is not None else draw(st.sampled_from(list(POSITIONAL_SCHEMES)))
     rules = [Rule.BACKWARD, Rule.FORWARD] if scheme == "external-reset" else list(GENERAL_RULES)
     b = 0.0 if scheme == "clamp-sum" else draw(weights)
     filter_rule = draw(st.sampled_from(GENERAL_RULES))
     fastest = 1.1 if order == 2 and filter_rule is Rule.FORWARD else 0.6  # in scans; the forward rule is stable above 1 and 1/2
-    return Algorithm(
-        series=series,
+    time = draw(st.floats(1, 100))
+    return algorithm(
+        form=Form.SERIES if series else Form.STANDARD,
         kp=kp,
         ki=draw(st.just(0.0) | st.floats(0.001, 1)),
         kd=draw(gains),
         b=b,
         c=draw(weights),
         Tf=draw(st.just(0.0) | st.floats(fastest, 20)) * h,
-        filter_on=place,
-        filter_order=order,
-        integral_rule=draw(st.sampled_from(rules)),
-        derivative_rule=draw(st.sampled_from(GENERAL_RULES)),
-        filter_rule=filter_rule,
-        windup=scheme,
-        tracking_time=draw(st.floats(1, 100)),
-        accumulated=b == 0 and (scheme == "clamp-sum" or draw(st.booleans())),
-        start=draw(st.sampled_from(["bumpless", "load-output"])),
-        derivative_start=draw(st.sampled_from(["running", "restarted"])),
+        Ti=time,
+        windup=back_calculation(time) if scheme == "back-calculation" else POSITIONAL_SCHEMES[scheme],
+        integral__rule=draw(st.sampled_from(rules)),
+        derivative__rule=draw(st.sampled_from(GENERAL_RULES)),
+        derivative__filter=filter_at(place, order, filter_rule),
+        proportional__accumulated=b == 0 and (scheme == "clamp-sum" or draw(st.booleans())),
+        transfer__start=draw(st.sampled_from(["bumpless", "load-output"])),
+        transfer__derivative=draw(st.sampled_from(["running", "restarted"])),
     )
 
 
@@ -149,7 +165,7 @@ def test_the_impulse_response_of_any_positional_program_is_that_of_its_law(a: Al
 
 @given(a=algorithms(h=0.7))
 def test_the_impulse_response_of_any_velocity_program_is_that_of_its_law(a: Algorithm) -> None:
-    a = replace(a, velocity=True, windup="velocity", accumulated=False, start="bumpless")
+    a = incremental(a, proportional__accumulated=False, transfer__start="bumpless")
     program = build(a, 0.7, limits=WIDE)
     for path in PATHS:
         assert_impulse(Law(a, 0.7).impulse(40, path), impulse(program, path, 40))
@@ -169,21 +185,18 @@ def test_the_impulse_response_is_that_of_the_law_under_every_rule_filter_and_for
     velocity: bool, series: bool, rule: Rule, integral: Rule, place: Place | Literal["none"], order: Literal[1, 2],
     kp: float, ki: float, kd: float, b: float, c: float, Tf: float, h: float,
 ) -> None:  # fmt: skip
-    a = Algorithm(
-        series=series,
+    a = algorithm(
+        form=Form.SERIES if series else Form.STANDARD,
         kp=kp,
         ki=ki,
         kd=kd,
         b=b,
         c=c,
         Tf=0.0 if place == "none" else Tf * h,
-        filter_on="term" if place == "none" else place,
-        filter_order=order,
-        velocity=velocity,
-        integral_rule=integral,
-        derivative_rule=rule,
-        filter_rule=rule,
-        windup="velocity" if velocity else "none",
+        windup=VELOCITY if velocity else NONE,
+        integral__rule=integral,
+        derivative__rule=rule,
+        derivative__filter=None if place == "none" else filter_at(place, order, rule),
     )
     program = build(a, h, limits=WIDE)
     for path in PATHS:
@@ -209,7 +222,7 @@ def test_in_its_own_units_every_card_is_its_percent_law_rescaled_by_the_spans(na
 @given(a=algorithms(), seed=seeds)
 def test_positional_and_velocity_agree_in_the_linear_range(a: Algorithm, seed: int) -> None:
     x = record(seed)
-    velocity = replace(a, velocity=True, windup="velocity", accumulated=False)
+    velocity = incremental(a, proportional__accumulated=False)
     positional_u = run(build(a, 1.0, limits=WIDE), x)
     velocity_u = run(build(velocity, 1.0, limits=WIDE), x)
     # both sum a hundred or so terms, each rounded to 1e-16 of the largest
@@ -223,10 +236,20 @@ def test_every_card_agrees_with_its_other_implementation_in_the_linear_range(nam
     a = settings_of(data, pidemu.load_card(name)).algorithm().linear
     if a.dahlin is not None:
         return  # it has one implementation only
-    a = replace(a, zero_power_up=False, start="bumpless", first_scan_holds=False, derivative_from_zero=False)
+    a = changed(
+        a,
+        transfer__power_up="transfer",
+        transfer__start="bumpless",
+        transfer__first_scan="integrates",
+        derivative__starts="sample",
+    )
     h = data.draw(scans_of(a))
     x = record(seed)
-    other = replace(a, velocity=not a.velocity, windup="none" if a.velocity else "velocity", accumulated=False)
+    other = (
+        changed(a, implementation="positional", integral__windup=NONE, proportional__accumulated=False)
+        if a.velocity
+        else incremental(a, proportional__accumulated=False)
+    )
     one_u, other_u = (run(build(which, h, limits=WIDE), x) for which in (a, other))
     scale = largest_term(a, h, x) + np.max(np.abs(one_u))  # as above
     assert np.max(np.abs(one_u - other_u)) <= 1e-9 * scale
@@ -251,7 +274,7 @@ def test_in_automatic_the_output_of_every_card_is_within_its_limits(
 def test_in_automatic_the_output_of_any_program_is_within_its_limits(a: Algorithm, velocity: bool, seed: int) -> None:
     x = record(seed, modes=True)
     if velocity:
-        a = replace(a, velocity=True, windup="velocity")
+        a = incremental(a)
     u = run(build(a, 1.0, limits=(10.0, 60.0)), x)
     in_auto = u[x.auto > 0]
     assert np.all((in_auto >= 10) & (in_auto <= 60))
@@ -264,8 +287,8 @@ def starts_in_automatic(x: Record) -> list[int]:
 def assert_bumpless(a: Algorithm, h: float, seed: int) -> None:
     x = record(seed, modes=True)
     u = run(build(a, h, limits=(0.0, 100.0), initial_output=30.0), x)
-    scale = (
-        largest_term(a, h, x) + 1e12 * (a.arithmetic.type == "integer") / a.counts
+    scale = largest_term(a, h, x) + 1e12 * (a.arithmetic.type == "integer") / (
+        a.arithmetic.counts or 1
     )  # whole counts; I = u - P - D, and then P + I + D: rounded to 1e-16 of the largest
     for n in starts_in_automatic(x):
         assert abs(u[n] - u[n - 1]) <= 1e-12 * scale
@@ -280,8 +303,15 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
     h = data.draw(scans_of(a))
     if a.transfer.start == "load-output" or (a.ki == 0 and not a.velocity and a.dahlin is None):  # bumped by P + D, as in the field
         x = record(seed, modes=True)
-        a = replace(
-            a.linear, kp=0.0, kd=0.0, ki=0.0, start="load-output", keeps_integral=True, holds="ki e", manual_output="operator"
+        a = changed(
+            a.linear,
+            kp=0.0,
+            kd=0.0,
+            ki=0.0,
+            transfer__start="load-output",
+            transfer__without_integral="kept",
+            integral__holds="ki e",
+            transfer__manual_output="operator",
         )
         u = run(build(a, h, initial_output=30.0), x)
         assert all(u[n] == u[n - 1] for n in starts_in_automatic(x))
@@ -292,21 +322,30 @@ def test_the_first_automatic_output_of_every_bumpless_card_is_the_last_manual_on
 @pytest.mark.parametrize("windup", [s for s in POSITIONAL_SCHEMES if not s.startswith("clamp")])
 @given(data=st.data(), seed=seeds)
 def test_the_first_automatic_output_of_any_bumpless_program_is_the_last_manual_one(
-    windup: Scheme, data: st.DataObject, seed: int
+    windup: str, data: st.DataObject, seed: int
 ) -> None:
     a = data.draw(algorithms(windup=windup))
-    assert_bumpless(replace(a, ki=a.ki or 0.1, start="bumpless"), 1.0, seed)
+    assert_bumpless(changed(a, ki=a.ki or 0.1, transfer__start="bumpless"), 1.0, seed)
 
 
 @given(a=algorithms(), seed=seeds)
 def test_the_first_automatic_output_of_any_velocity_program_is_the_last_manual_one(a: Algorithm, seed: int) -> None:
-    assert_bumpless(replace(a, velocity=True, windup="velocity"), 1.0, seed)
+    assert_bumpless(incremental(a), 1.0, seed)
 
 
 @pytest.mark.parametrize("windup", POSITIONAL_SCHEMES)
 @given(a=algorithms(), seed=seeds)
-def test_no_windup_scheme_moves_the_integral_of_a_proportional_controller(windup: Scheme, a: Algorithm, seed: int) -> None:
-    a = replace(a, ki=0.0, kd=0.0, Tf=0.0, b=1.0, windup=windup, accumulated=False, start="bumpless")
+def test_no_windup_scheme_moves_the_integral_of_a_proportional_controller(windup: str, a: Algorithm, seed: int) -> None:
+    a = changed(
+        a,
+        ki=0.0,
+        kd=0.0,
+        Tf=0.0,
+        b=1.0,
+        integral__windup=POSITIONAL_SCHEMES[windup],
+        proportional__accumulated=False,
+        transfer__start="bumpless",
+    )
     program = build(a, 1.0, limits=(0.0, 100.0))
     x = record(seed, modes=True)
     assert states_after(program, x).get("I", 0.0) == 0.0
@@ -320,7 +359,8 @@ def test_direct_action_is_reverse_action_on_mirrored_signals(name: str, data: st
     chosen = settings_of(data, pidemu.load_card(name))
     a = chosen.algorithm(own_units=True).linear  # whole numbers are rounded down, which has no mirror image
     if chosen.equation.action.fixed:
-        a = replace(a, manual_output="operator")  # there is no direct action: the real one's output in manual has the gain's sign
+        # there is no direct action: the real one's output in manual has the gain's sign
+        a = changed(a, transfer__manual_output="operator")
     h = data.draw(scans_of(a))
     x = record(seed, modes=True)
     mirrored = replace(x, sp=-x.sp, pv=-x.pv)
@@ -332,7 +372,7 @@ def test_direct_action_is_reverse_action_on_mirrored_signals(name: str, data: st
 @given(data=st.data())
 def test_reverse_acting_means_that_the_output_falls_when_the_measurement_rises(name: str, data: st.DataObject) -> None:
     a = settings_of(data, pidemu.load_card(name)).algorithm()
-    a = replace(a.linear, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd))  # a negative gain turns the action round
+    a = changed(a.linear, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd))  # a negative gain turns the action round
     first = impulse(build(a, data.draw(scans_of(a)), limits=WIDE), "feedback", 1)[0]
     late = a.integral.rule is Rule.FORWARD or a.ki == 0.0
     assert first > 0 or (a.kp == a.kd == 0.0 and late and first == 0)
@@ -348,10 +388,15 @@ DECAY = 50 * 0.98 ** np.arange(100_000.0)
 @pytest.mark.parametrize(("place", "order"), FILTERS)
 @pytest.mark.parametrize("velocity", [False, True], ids=["positional", "velocity"])
 def test_states_decay_to_zero_and_not_to_denormal_numbers(rule: Rule, place: Place, order: Literal[1, 2], velocity: bool) -> None:
-    a = Algorithm(
-        series=False, kp=2.0, ki=0.0, kd=5.0, c=0.0, Tf=20.0, filter_on=place, filter_order=order, velocity=velocity,
-        derivative_rule=rule, filter_rule=rule, windup="velocity" if velocity else "none",
-    )  # fmt: skip
+    a = algorithm(
+        kp=2.0,
+        kd=5.0,
+        c=0.0,
+        Tf=20.0,
+        windup=VELOCITY if velocity else NONE,
+        derivative__rule=rule,
+        derivative__filter=filter_at(place, order, rule),
+    )
     program = build(a, 1.0, limits=WIDE)
     states = states_after(program, Record(DECAY * 0, DECAY, DECAY * 0 + 1, DECAY * 0))
     kept = {name: value for name, value in states.items() if name not in ("on", "begun") and not (velocity and name == "u")}
@@ -359,9 +404,9 @@ def test_states_decay_to_zero_and_not_to_denormal_numbers(rule: Rule, place: Pla
 
 
 @pytest.mark.parametrize("rule", [Rule.BACKWARD, Rule.FORWARD])
-@pytest.mark.parametrize("windup", ["back-calculation", "external-reset"])
-def test_an_integral_that_is_drawn_back_to_zero_arrives_there(rule: Rule, windup: Scheme) -> None:
-    a = Algorithm(series=False, kp=2.0, ki=0.1, kd=0.0, integral_rule=rule, windup=windup, tracking_time=20.0)
+@pytest.mark.parametrize("windup", [back_calculation(20.0), EXTERNAL_RESET], ids=lambda windup: windup.scheme)
+def test_an_integral_that_is_drawn_back_to_zero_arrives_there(rule: Rule, windup: Scheme[float]) -> None:
+    a = algorithm(kp=2.0, ki=0.1, Ti=20.0, windup=windup, integral__rule=rule)
     program = build(a, 1.0, limits=(-100.0, 0.0))
     pv = np.zeros(50_000)
     pv[0] = 50.0  # the start sets I = u - P = 100, and the high limit is 0
@@ -386,10 +431,9 @@ class Pid:
     kd: float
     Tt: float
 
-    def algorithm(self, windup: Scheme, **more: Any) -> Algorithm:
-        return Algorithm(
-            series=False, kp=self.kp, ki=self.ki, kd=self.kd, c=0.0, windup=windup, tracking_time=self.Tt, **more
-        )  # fmt: skip
+    def algorithm(self, windup: Scheme[float], **more: Any) -> Algorithm:
+        scheme = back_calculation(self.Tt) if isinstance(windup, WindupBackCalculation) else windup
+        return algorithm(kp=self.kp, ki=self.ki, kd=self.kd, c=0.0, windup=scheme, **more)
 
     def P(self, x: Record, n: int) -> float:
         return self.kp * float(x.sp[n] - x.pv[n])
@@ -496,26 +540,25 @@ def by_velocity(c: Pid, x: Record) -> list[float]:
     return u
 
 
-REFERENCES: list[tuple[str, Scheme, Callable[[Pid, Record], list[float]], dict[str, Any]]] = [
-    ("none", "none", by_none, {}),
-    ("clamp", "clamp", by_clamp, {}),
-    ("clamp-sum", "clamp-sum", by_clamp_sum, {"b": 0.0, "accumulated": True, "start": "load-output"}),
-    ("freeze", "freeze", by_freeze, {}),
-    ("conditional, dropping", "conditional", by_conditional, {"gate": Gate(drops=True)}),
-    ("back-calculation", "back-calculation", by_back_calculation, {}),
-    ("external-reset backward", "external-reset", by_external_reset, {}),
-    ("external-reset forward", "external-reset", by_external_reset_forward, {"integral_rule": Rule.FORWARD}),
-    ("velocity", "velocity", by_velocity, {"velocity": True}),
+DROPPING: Scheme[float] = WindupConditional(scheme="conditional", last_increment="dropped")
+REFERENCES: list[tuple[str, Scheme[float], Callable[[Pid, Record], list[float]], dict[str, Any]]] = [
+    ("none", NONE, by_none, {}),
+    ("clamp", CLAMP, by_clamp, {}),
+    ("clamp-sum", CLAMP_SUM, by_clamp_sum, {"b": 0.0, "proportional__accumulated": True, "transfer__start": "load-output"}),
+    ("freeze", FREEZE, by_freeze, {}),
+    ("conditional, dropping", DROPPING, by_conditional, {}),
+    ("back-calculation", back_calculation(20.0), by_back_calculation, {}),  # of the tracking time that is drawn
+    ("external-reset backward", EXTERNAL_RESET, by_external_reset, {}),
+    ("external-reset forward", EXTERNAL_RESET, by_external_reset_forward, {"integral__rule": Rule.FORWARD}),
+    ("velocity", VELOCITY, by_velocity, {}),
 ]
 
 
 @pytest.mark.parametrize(("scheme", "reference", "more"), [r[1:] for r in REFERENCES], ids=[r[0] for r in REFERENCES])
 @given(pid=pids, seed=seeds)
 def test_each_windup_scheme_obeys_its_rule(
-    scheme: Scheme, reference: Callable[[Pid, Record], list[float]], more: dict[str, Any], pid: Pid, seed: int
+    scheme: Scheme[float], reference: Callable[[Pid, Record], list[float]], more: dict[str, Any], pid: Pid, seed: int
 ) -> None:
-    if scheme == "external-reset":
-        pid = replace(pid, Tt=pid.kp / pid.ki)  # the tracking time of external reset is Ti
     x = record(seed)
     program = build(pid.algorithm(scheme, **more), H, limits=(LOW, HIGH), initial_output=U0)
     expected = np.array(reference(pid, x))
@@ -533,26 +576,26 @@ def test_the_records_reach_the_limits_so_that_schemes_differ_from_integrating_al
 
 # --- refusals --------------------------------------------------------------------------------------------------------
 
-PI = Algorithm(series=False, kp=2.0, ki=0.1, kd=0.0)
+PI = algorithm(kp=2.0, ki=0.1)
 
 
 def test_a_bias_belongs_to_a_positional_controller_without_integral() -> None:
-    alone = replace(PI, ki=0.0)
+    alone = changed(PI, ki=0.0)
     x = record(5)
     assert np.array_equal(np.clip(2.0 * (x.sp - x.pv) + 50.0, 0, 100), run(build(alone, 1.0, bias=50.0), x))
-    for a in (PI, replace(alone, velocity=True, windup="velocity")):
+    for a in (PI, incremental(alone)):
         with pytest.raises(ScanError, match="a bias belongs to a positional controller without integral action"):
             build(a, 1.0, bias=50.0)
 
 
 def test_external_reset_by_the_trapezoidal_rule_is_refused() -> None:
     with pytest.raises(ScanError, match="external-reset windup is defined for the backward and forward rules only"):
-        build(replace(PI, windup="external-reset", integral_rule=Rule.TRAPEZOIDAL), 1.0)
+        build(changed(PI, integral__windup=EXTERNAL_RESET, integral__rule=Rule.TRAPEZOIDAL), 1.0)
 
 
 @pytest.mark.parametrize("place", ["term", "measurement", "output"])
 def test_an_unstable_forward_filter_is_refused(place: Place) -> None:
-    a = replace(PI, kd=3.0, Tf=0.5, filter_on=place, derivative_rule=Rule.FORWARD, filter_rule=Rule.FORWARD)
+    a = changed(PI, kd=3.0, Tf=0.5, derivative__rule=Rule.FORWARD, derivative__filter=filter_at(place, 1, Rule.FORWARD))
     with pytest.raises(ScanError, match="is unstable; use a scan interval below 1 s or no filter"):
         build(a, 1.0)
     assert run(build(a, 0.9), record(3)).size == 150
@@ -561,7 +604,7 @@ def test_an_unstable_forward_filter_is_refused(place: Place) -> None:
 @pytest.mark.parametrize("Tf", [0.6, 1.0])
 def test_a_second_order_forward_filter_is_refused_up_to_the_scan_interval(Tf: float) -> None:
     # s = (z - 1)/h puts the poles (-1 +- j)/Tf at 1 - (1 -+ j) h/Tf, inside the unit circle only for Tf > h
-    a = replace(PI, Tf=Tf, filter_on="measurement", filter_order=2, filter_rule=Rule.FORWARD)
+    a = changed(PI, Tf=Tf, derivative__filter=filter_at("measurement", 2, Rule.FORWARD))
     with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
         build(a, 1.0)
     with pytest.raises(ScanError, match=f"is unstable; use a scan interval below {Tf:g} s or no filter"):
@@ -569,15 +612,16 @@ def test_a_second_order_forward_filter_is_refused_up_to_the_scan_interval(Tf: fl
 
 
 def test_a_proportional_term_in_the_integral_sum_stays_where_there_is_no_integral() -> None:
-    a = Algorithm(series=False, kp=2.0, ki=0.0, kd=0.0, b=0.0, windup="clamp-sum", accumulated=True)
+    a = algorithm(kp=2.0, b=0.0, windup=CLAMP_SUM, proportional__accumulated=True)
     x = record(6, amplitude=10.0)
     assert np.array_equal(
-        run(build(replace(a, start="load-output"), 1.0, initial_output=50.0), x), run(build(a, 1.0, initial_output=50.0), x)
+        run(build(changed(a, transfer__start="load-output"), 1.0, initial_output=50.0), x),
+        run(build(a, 1.0, initial_output=50.0), x),
     )
 
 
 def test_a_velocity_program_with_every_term_off_holds_its_output() -> None:
-    a = Algorithm(series=False, kp=0.0, ki=0.0, kd=0.0, velocity=True, windup="velocity")
+    a = algorithm(windup=VELOCITY)
     assert np.array_equal(np.full(150, 30.0), run(build(a, 1.0, initial_output=30.0), record(4)))
 
 
@@ -696,14 +740,14 @@ def test_no_controller_stays_at_a_limit_once_the_error_has_turned(name: str) -> 
                 given[dial] = working(*limits(s))
         settings_ = card.settings(given)
         a = settings_.algorithm()
-        if not a.ki or a.windup == "none":
+        if not a.ki or a.integral.windup.scheme == "none":
             continue  # such an integral winds up for as long as the error lasts, and unwinds as slowly
         controller = pidemu.Controller(settings_, 1.0, output_limits=(0, 100), initial_output=50.0)
         controller.run([50.0, *[60.0] * 600], [50.0, *[20.0] * 600])
         back = controller.run(60.0, np.full(140, 65.0))
         assert controller.output < 100
         # a lag of 60 s that integrates without P goes from 3 times 40 beyond the limit towards 3 times -5: 60 ln 9 = 132 s
-        longest = 133 if a.windup == "external-reset" and not a.kp else 60
+        longest = 133 if a.integral.windup.scheme == "external-reset" and not a.kp else 60
         assert np.argmax(back < 100) <= longest, (variant.chosen, back[:5])
 
 

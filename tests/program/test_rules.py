@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,11 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pidemu import Controller
-from pidemu.algorithm.model import Algorithm, Lag
-from pidemu.card.model.base import GENERAL_RULES, Rule
+from pidemu.algorithm.model import Algorithm
+from pidemu.card.model.base import GENERAL_RULES, Form, GeneralRule, Rule
+from pidemu.card.model.signals import SignalFilter
 from pidemu.errors import ScanError
 from pidemu.law.law import Law
 from pidemu.program.builder import build
+from tests.algorithms import NONE, VELOCITY, algorithm, changed, incremental
 from tests.helpers import WIDE, Floats, made_up_card, outputs
 from tests.program.support import lagged, positional, signals, states_of, velocity
 
@@ -24,17 +25,18 @@ U0 = 20.0
 RULES = [(rule, True) for rule in (*GENERAL_RULES, Rule.EXACT, Rule.LAGGED_DIFFERENCE)] + [(Rule.FOUR_POINT, False)]
 BEFORE: dict[str, dict[str, Any]] = {
     "none": {},
-    "previous measurement": {"previous_pv": True},
-    "setpoint filter": {"sp_filter": Lag(7.0)},
-    "setpoint factor": {"sp_filter": Lag(0.0, 0.3)},
-    "measurement filter": {"pv_filter": Lag(7.0)},
-    "measurement factor": {"pv_filter": Lag(0.0, 0.3)},
-    "error filter": {"e_filter": Lag(7.0), "b": 1.0, "c": 1.0},
-    "error factor": {"e_filter": Lag(0.0, 0.3), "b": 1.0, "c": 1.0},
-    "forward filter": {"pv_filter": Lag(7.0, rule=Rule.FORWARD)},
-    "trapezoidal filter": {"pv_filter": Lag(7.0, rule=Rule.TRAPEZOIDAL)},
+    "previous measurement": {"measurement__previous_scan": True},
+    "setpoint filter": {"setpoint__filter": SignalFilter(time=7.0)},
+    "setpoint factor": {"setpoint__filter": SignalFilter(time=0.0, factor=0.3)},
+    "measurement filter": {"measurement__filter": SignalFilter(time=7.0)},
+    "measurement factor": {"measurement__filter": SignalFilter(time=0.0, factor=0.3)},
+    "error filter": {"error__filter": SignalFilter(time=7.0), "b": 1.0, "c": 1.0},
+    "error factor": {"error__filter": SignalFilter(time=0.0, factor=0.3), "b": 1.0, "c": 1.0},
+    "forward filter": {"measurement__filter": SignalFilter(time=7.0, rule=Rule.FORWARD)},
+    "trapezoidal filter": {"measurement__filter": SignalFilter(time=7.0, rule=Rule.TRAPEZOIDAL)},
     "all at once": {
-        "previous_pv": True, "sp_filter": Lag(0.0, 0.5), "pv_filter": Lag(3.0), "e_filter": Lag(2.0), "b": 1.0, "c": 1.0,
+        "measurement__previous_scan": True, "setpoint__filter": SignalFilter(time=0.0, factor=0.5),
+        "measurement__filter": SignalFilter(time=3.0), "error__filter": SignalFilter(time=2.0), "b": 1.0, "c": 1.0,
     },
 }  # fmt: skip
 """What is done to the signals; the filter on the error goes with P and D on the error."""
@@ -44,18 +46,18 @@ weights = st.sampled_from([0.0, 1.0]) | st.floats(0.1, 1)
 seeds = st.integers(0, 2**32 - 1)
 
 in_each_form = pytest.mark.parametrize("series", [False, True], ids=["parallel", "series"])
-in_each_implementation = pytest.mark.parametrize("incremental", [False, True], ids=["positional", "velocity"])
+in_each_implementation = pytest.mark.parametrize("by_increments", [False, True], ids=["positional", "velocity"])
 with_each_rule = pytest.mark.parametrize(("rule", "filtered"), RULES, ids=[rule.value for rule, _ in RULES])
 behind_each_filter = pytest.mark.parametrize("before", BEFORE)
 
 
 @st.composite
 def algorithms(draw: st.DrawFn, rule: Rule, filtered: bool, series: bool, before: str) -> Algorithm:
-    a = Algorithm(
-        series=series, kp=draw(gains), ki=draw(st.floats(0.01, 0.5)), kd=draw(gains), b=draw(weights), c=draw(weights),
-        Tf=draw(st.floats(1.2, 30)) if filtered else 0.0, derivative_rule=rule,
+    a = algorithm(
+        form=Form.SERIES if series else Form.STANDARD, kp=draw(gains), ki=draw(st.floats(0.01, 0.5)), kd=draw(gains),
+        b=draw(weights), c=draw(weights), Tf=draw(st.floats(1.2, 30)) if filtered else 0.0, derivative__rule=rule,
     )  # fmt: skip
-    return replace(a, **BEFORE[before])
+    return changed(a, **BEFORE[before])
 
 
 def assert_close(expected: Floats, actual: Floats, a: Algorithm, h: float, size: float = 100.0) -> None:
@@ -71,13 +73,12 @@ def assert_close(expected: Floats, actual: Floats, a: Algorithm, h: float, size:
 @settings(max_examples=3)
 @given(data=st.data(), h=st.sampled_from([0.25, 1.0]), seed=seeds)
 def test_a_program_is_the_loop_written_by_hand(
-    rule: Rule, filtered: bool, before: str, series: bool, incremental: bool, data: st.DataObject, h: float, seed: int
+    rule: Rule, filtered: bool, before: str, series: bool, by_increments: bool, data: st.DataObject, h: float, seed: int
 ) -> None:
     a = data.draw(algorithms(rule, filtered, series, before))
     sp, pv = signals(seed)
-    by_hand = velocity if incremental else positional
-    how = replace(a, velocity=incremental, windup="velocity" if incremental else "none")
-    program = build(how, h, limits=WIDE, initial_output=U0)
+    by_hand = velocity if by_increments else positional
+    program = build(incremental(a) if by_increments else a, h, limits=WIDE, initial_output=U0)
     assert_close(by_hand(a, h, sp, pv, U0), outputs(program, sp, pv), a, h)
 
 
@@ -89,11 +90,11 @@ def test_a_program_is_the_loop_written_by_hand(
 @settings(max_examples=2)
 @given(data=st.data(), h=st.sampled_from([0.25, 1.0]))
 def test_the_impulse_response_is_that_of_the_discrete_law(
-    rule: Rule, filtered: bool, before: str, series: bool, incremental: bool, path: Literal["feedback", "setpoint"],
+    rule: Rule, filtered: bool, before: str, series: bool, by_increments: bool, path: Literal["feedback", "setpoint"],
     data: st.DataObject, h: float,
 ) -> None:  # fmt: skip
     a = data.draw(algorithms(rule, filtered, series, before))
-    a = replace(a, velocity=incremental, windup="velocity" if incremental else "none")
+    a = incremental(a) if by_increments else a
     one, zero = np.zeros(41), np.zeros(41)
     one[1] = 1.0  # the first scan is the start, at rest
     program = build(a, h, limits=WIDE)
@@ -108,8 +109,10 @@ def test_the_impulse_response_is_that_of_the_discrete_law(
 
 @in_each_implementation
 @given(kd=gains, Tf=st.floats(0.05, 50), h=st.floats(0.05, 5), slope=st.floats(-5, 5))
-def test_the_exact_rule_is_the_sampled_response_to_a_ramp(incremental: bool, kd: float, Tf: float, h: float, slope: float) -> None:
-    a = Algorithm(series=False, kp=0.0, ki=0.0, kd=kd, Tf=Tf, derivative_rule=Rule.EXACT, velocity=incremental)
+def test_the_exact_rule_is_the_sampled_response_to_a_ramp(
+    by_increments: bool, kd: float, Tf: float, h: float, slope: float
+) -> None:
+    a = algorithm(kd=kd, Tf=Tf, windup=VELOCITY if by_increments else NONE, derivative__rule=Rule.EXACT)
     t = h * np.arange(60.0)
     u = outputs(build(a, h, limits=WIDE), slope * t, np.zeros(60))
     expected = kd * slope * -np.expm1(-t / Tf)  # kd s/(1 + Tf s) times slope/s^2, back in time
@@ -126,7 +129,7 @@ def test_the_exact_rule_is_the_sampled_response_to_any_broken_line(kd: float, Tf
     changes = np.diff(slopes, prepend=0.0)
     since = np.maximum(t[:, None] - t[None, :], 0.0)
     expected = kd * (-np.expm1(-since / Tf) @ changes)
-    a = Algorithm(series=False, kp=0.0, ki=0.0, kd=kd, Tf=Tf, derivative_rule=Rule.EXACT)
+    a = algorithm(kd=kd, Tf=Tf, derivative__rule=Rule.EXACT)
     u = outputs(build(a, h, limits=WIDE), x, np.zeros(60))
     assert np.max(np.abs(expected - u)) <= 1e-11 * kd * 60 * np.max(np.abs(slopes))  # 60 ramps that cancel
 
@@ -135,9 +138,9 @@ def test_the_exact_rule_is_the_sampled_response_to_any_broken_line(kd: float, Tf
 def test_after_a_step_exact_and_lagged_difference_decay_alike_from_different_heights(Tf: float, h: float) -> None:
     step = np.ones(30)
     step[0] = 0.0
-    a = Algorithm(series=False, kp=0.0, ki=0.0, kd=2.0, Tf=Tf, derivative_rule=Rule.EXACT)
+    a = algorithm(kd=2.0, Tf=Tf, derivative__rule=Rule.EXACT)
     exact, difference = (
-        outputs(build(replace(a, derivative_rule=rule), h, limits=WIDE), step, 0 * step)[1:]
+        outputs(build(changed(a, derivative__rule=rule), h, limits=WIDE), step, 0 * step)[1:]
         for rule in (Rule.EXACT, Rule.LAGGED_DIFFERENCE)
     )
     decay = np.exp(-h / Tf * np.arange(29))
@@ -147,7 +150,7 @@ def test_after_a_step_exact_and_lagged_difference_decay_alike_from_different_hei
 
 
 def test_four_points_of_a_ramp_give_its_slope_and_of_an_alternation_nothing_like_its_height() -> None:
-    a = Algorithm(series=False, kp=0.0, ki=0.0, kd=2.0, derivative_rule=Rule.FOUR_POINT)
+    a = algorithm(kd=2.0, derivative__rule=Rule.FOUR_POINT)
     program, n = build(a, 0.5, limits=WIDE), np.arange(8.0)
     assert outputs(program, 3.0 * n, 0 * n)[3:].tolist() == [12.0] * 5  # 2 times 3 per 0.5 s
     alternating = outputs(program, (-1.0) ** n, 0 * n)[3:]
@@ -160,12 +163,12 @@ def test_four_points_of_a_ramp_give_its_slope_and_of_an_alternation_nothing_like
 
 @pytest.mark.parametrize("rule", GENERAL_RULES)
 @given(Tf=st.floats(0.6, 20), seed=seeds)
-def test_a_filter_starts_in_the_steady_state_of_its_first_sample(rule: Rule, Tf: float, seed: int) -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.0, kd=0.0, pv_filter=Lag(Tf, rule=rule))
+def test_a_filter_starts_in_the_steady_state_of_its_first_sample(rule: GeneralRule, Tf: float, seed: int) -> None:
+    a = algorithm(kp=1.0, measurement__filter=SignalFilter(time=Tf, rule=rule))
     _, pv = signals(seed, 40)
     u = outputs(build(a, 1.0, limits=WIDE), 0 * pv, pv)
     assert u[0] == pytest.approx(-pv[0], rel=1e-14)  # the weights add up to 1 but for rounding
-    assert np.max(np.abs(lagged(pv, Lag(Tf, rule=rule), 1.0) + u)) <= 1e-12 * np.max(np.abs(pv))
+    assert np.max(np.abs(lagged(pv, SignalFilter(time=Tf, rule=rule), 1.0) + u)) <= 1e-12 * np.max(np.abs(pv))
 
 
 @pytest.mark.parametrize("h", [0.1, 1.0, 7.0])
@@ -185,30 +188,29 @@ def test_a_factor_is_the_share_of_the_new_sample_at_every_scan_interval(h: float
 
 
 def test_the_measurement_of_the_previous_scan_enters_every_term_one_scan_late() -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.5, kd=3.0, previous_pv=True)
+    a = algorithm(kp=1.0, ki=0.5, kd=3.0, measurement__previous_scan=True)
     late = states_of(build(a, 1.0, limits=WIDE), np.zeros(5), np.array([0.0, 8, 8, 8, 8]), "D", "I", "u")
     assert [x.tolist() for x in late] == [[0, 0, -24, 0, 0], [0, 0, -4, -8, -12], [0, 0, -36, -16, -20]]
 
 
 @given(seed=seeds)
 def test_a_filter_on_the_setpoint_leaves_the_way_of_the_measurement_alone(seed: int) -> None:
-    a = Algorithm(series=True, kp=2.0, ki=0.1, kd=4.0, Tf=2.0)
+    a = algorithm(form=Form.SERIES, kp=2.0, ki=0.1, kd=4.0, Tf=2.0)
     _, pv = signals(seed)
-    plain, filtered = (build(replace(a, sp_filter=f), 1.0, limits=WIDE) for f in (None, Lag(9.0)))
+    plain, filtered = (build(changed(a, setpoint__filter=f), 1.0, limits=WIDE) for f in (None, SignalFilter(time=9.0)))
     assert outputs(plain, 0 * pv, pv).tolist() == outputs(filtered, 0 * pv, pv).tolist()  # a setpoint of 0 stays 0
 
 
-@pytest.mark.parametrize("name", ["sp_filter", "pv_filter", "e_filter"])
+@pytest.mark.parametrize("name", ["setpoint", "measurement", "error"])
 def test_a_forward_filter_faster_than_half_the_scan_interval_is_refused(name: str) -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.0, kd=0.0)
-    fast: dict[str, Any] = {name: Lag(0.5, rule=Rule.FORWARD)}
+    fast: dict[str, Any] = {f"{name}__filter": SignalFilter(time=0.5, rule=Rule.FORWARD)}
     with pytest.raises(ScanError, match="the forward rule is unstable"):
-        build(replace(a, **fast), 1.0)
+        build(algorithm(kp=1.0, **fast), 1.0)
 
 
 def test_a_rule_that_does_not_fit_the_filter_is_refused() -> None:
-    a = Algorithm(series=False, kp=1.0, ki=0.0, kd=1.0)
+    a = algorithm(kp=1.0, kd=1.0)
     with pytest.raises(ScanError, match="needs a filter on the derivative term"):
-        build(replace(a, derivative_rule=Rule.LAGGED_DIFFERENCE), 1.0)
+        build(changed(a, derivative__rule=Rule.LAGGED_DIFFERENCE), 1.0)
     with pytest.raises(ScanError, match="goes with no other on the derivative term"):
-        build(replace(a, derivative_rule=Rule.FOUR_POINT, Tf=1.0), 1.0)
+        build(changed(a, derivative__rule=Rule.FOUR_POINT, Tf=1.0), 1.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,23 +17,43 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import pidemu
-from pidemu.algorithm.model import Algorithm, Gate, Lag, Shape
+from pidemu.algorithm.model import Algorithm
 from pidemu.backends.python import compiled
 from pidemu.card.load import variants
 from pidemu.card.model.base import Rule
+from pidemu.card.model.integral import IntegralLimits
+from pidemu.card.model.signals import ErrorShape, SignalFilter
+from pidemu.card.windup import Scheme
+from pidemu.card.windup.back_calculation import WindupBackCalculation
+from pidemu.card.windup.conditional import WindupConditional
+from pidemu.card.windup.external_reset import FastReturn, WindupExternalReset
+from pidemu.card.windup.freeze import WindupFreeze
+from pidemu.card.windup.recompute import WindupRecompute
 from pidemu.checks.runs import plausible
 from pidemu.errors import UndefinedError
 from pidemu.program.builder import build
 from pidemu.program.ir import Program
+from tests.algorithms import (
+    CLAMP,
+    CONDITIONAL,
+    EXTERNAL_RESET,
+    FREEZE,
+    NONE,
+    RECOMPUTE,
+    RESET_OUTSIDE_BAND,
+    algorithm,
+    back_calculation,
+    changed,
+)  # fmt: skip
 from tests.helpers import Floats, made_up_card, outputs
 from tests.program.support import signals, states_of
 
 LOW, HIGH, H, U0 = 0.0, 100.0, 0.5, 40.0
-PLAIN = Algorithm(series=False, kp=2.0, ki=0.5, kd=1.0, c=0.0)
+PLAIN = algorithm(kp=2.0, ki=0.5, kd=1.0, c=0.0)
 
 seeds = st.integers(0, 2**32 - 1)
 pids = st.builds(
-    lambda kp, Ti, kd: replace(PLAIN, kp=kp, ki=kp / Ti, kd=kd, tracking_time=Ti),
+    lambda kp, Ti, kd: changed(PLAIN, kp=kp, ki=kp / Ti, kd=kd, Ti=Ti),
     kp=st.floats(0.1, 10),
     Ti=st.floats(1, 100),
     kd=st.just(0.0) | st.floats(0.1, 10),
@@ -157,30 +177,39 @@ def lower_limit_of_the_output(x: Scan) -> tuple[float, float]:
     return clip(x.P + I + x.D), I
 
 
-def back_calculation(x: Scan) -> tuple[float, float]:
+def by_back_calculation(x: Scan) -> tuple[float, float]:
     v = x.P + (x.I + x.dI) + x.D
     return clip(v), x.I + x.dI + H / 4.0 * (clip(v) - v)
 
 
+def windup(scheme: Scheme[float]) -> dict[str, Any]:
+    return {"integral__windup": scheme}
+
+
 SCHEMES: dict[str, tuple[Callable[[], Callable[[Scan], tuple[float, float]]], dict[str, Any]]] = {
-    "recompute": (lambda: recompute, {"windup": "recompute"}),
+    "recompute": (lambda: recompute, windup(RECOMPUTE)),
     "recompute without derivative": (
-        lambda: recompute_without_derivative, {"windup": "recompute", "gate": Gate(without_derivative=True)},
+        lambda: recompute_without_derivative, windup(WindupRecompute(scheme="recompute", without_derivative=True)),
     ),
-    "recompute, clamped": (lambda: recompute_clamped, {"windup": "recompute", "gate": Gate(clamped=True)}),
-    "freeze in both directions": (lambda: freeze_both, {"windup": "freeze", "gate": Gate(both=True)}),
-    "freeze by the sum without derivative": (freeze_on_inner_sum, {"windup": "freeze", "gate": Gate(without_derivative=True)}),
+    "recompute, clamped": (lambda: recompute_clamped, windup(WindupRecompute(scheme="recompute", clamped=True))),
+    "freeze in both directions": (lambda: freeze_both, windup(WindupFreeze(scheme="freeze", direction="both"))),
+    "freeze by the sum without derivative": (
+        freeze_on_inner_sum, windup(WindupFreeze(scheme="freeze", judged_on="sum-without-derivative")),
+    ),
     "conditional by error times output": (
-        lambda: conditional_by_sign, {"windup": "conditional", "gate": Gate(by_output_sign=True, drops=True)},
+        lambda: conditional_by_sign,
+        windup(WindupConditional(scheme="conditional", test="error-times-output", last_increment="dropped")),
     ),
-    "conditional": (lambda: conditional, {"windup": "conditional"}),
+    "conditional": (lambda: conditional, windup(CONDITIONAL)),
     "conditional, the last increment dropped": (
-        lambda: conditional_dropping, {"windup": "conditional", "gate": Gate(drops=True)},
+        lambda: conditional_dropping, windup(WindupConditional(scheme="conditional", last_increment="dropped")),
     ),
-    "reset outside the band": (lambda: reset_outside_band, {"windup": "reset-outside-band"}),
-    "integral limits": (lambda: limits_of_its_own, {"integral_limits": (-15.0, 30.0)}),
-    "integral limits, the lower one the output's": (lambda: lower_limit_of_the_output, {"integral_limits": (None, 30.0)}),
-    "back-calculation": (lambda: back_calculation, {"windup": "back-calculation", "tracking_time": 4.0}),
+    "reset outside the band": (lambda: reset_outside_band, windup(RESET_OUTSIDE_BAND)),
+    "integral limits": (lambda: limits_of_its_own, {"integral__limits": IntegralLimits(low=-15.0, high=30.0)}),
+    "integral limits, the lower one the output's": (
+        lambda: lower_limit_of_the_output, {"integral__limits": IntegralLimits(low="output", high=30.0)},
+    ),
+    "back-calculation": (lambda: by_back_calculation, windup(back_calculation(4.0))),
 }  # fmt: skip
 
 
@@ -192,7 +221,7 @@ def program(a: Algorithm, **more: Any) -> Program:
 @given(pid=pids, seed=seeds)
 def test_output_and_integral_are_those_of_the_loop_written_by_hand(name: str, pid: Algorithm, seed: int) -> None:
     by_hand, how = SCHEMES[name]
-    a, (sp, pv) = replace(pid, **how), signals(seed, amplitude=60.0)
+    a, (sp, pv) = changed(pid, **how), signals(seed, amplitude=60.0)
     expected = loop(a, sp, pv, by_hand())
     # sums in another order: 120 roundings of 1e-16 of the largest term
     scale = 16 * 120 * (a.kp + a.kd / H + a.ki * H * 120)
@@ -204,7 +233,7 @@ def test_output_and_integral_are_those_of_the_loop_written_by_hand(name: str, pi
 def test_the_signals_tell_each_scheme_from_integrating_always(name: str) -> None:
     sp, pv = signals(1, amplitude=60.0)
     always = states_of(program(PLAIN), sp, pv, "I")[0]
-    assert always.tolist() != loop(replace(PLAIN, **SCHEMES[name][1]), sp, pv, SCHEMES[name][0]())[1].tolist()
+    assert always.tolist() != loop(changed(PLAIN, **SCHEMES[name][1]), sp, pv, SCHEMES[name][0]())[1].tolist()
 
 
 # --- external reset and fast return ----------------------------------------------------------------------------------
@@ -214,7 +243,7 @@ def test_the_signals_tell_each_scheme_from_integrating_always(name: str) -> None
 @given(pid=pids, seed=seeds)
 def test_with_an_external_signal_the_integral_is_its_lag_less_the_derivative(rule: Rule, pid: Algorithm, seed: int) -> None:
     """``Ti F' = R - D - F``: what the valve did, whatever this controller asked for; NaN stands for the output itself."""
-    a = replace(pid, windup="external-reset", integral_rule=rule)
+    a = changed(pid, integral__windup=EXTERNAL_RESET, integral__rule=rule)
     Ti, (sp, pv) = a.kp / a.ki, signals(seed, amplitude=60.0)
     rng = np.random.default_rng(seed)
     signal = np.where(rng.uniform(size=sp.size) < 0.3, math.nan, rng.uniform(-20, 120, sp.size))
@@ -234,12 +263,13 @@ def test_with_an_external_signal_the_integral_is_its_lag_less_the_derivative(rul
         assert I == pytest.approx(F, rel=1e-9, abs=1e-9)  # terms of a thousand, rounded 120 times
 
 
-FAST = Gate(fast_return=16.0, fast_beyond=(10.0, 90.0))
+def fast_beyond(low: float, high: float) -> Scheme[float]:
+    return WindupExternalReset(scheme="external-reset", fast_return=FastReturn(factor=16.0, low=low, high=high))
 
 
 @given(pid=pids, seed=seeds)
 def test_from_beyond_its_own_limits_the_integral_comes_back_sixteen_times_as_fast_as_by_hand(pid: Algorithm, seed: int) -> None:
-    a, (sp, pv) = replace(pid, windup="external-reset", gate=FAST), signals(seed, amplitude=60.0)
+    a, (sp, pv) = changed(pid, integral__windup=fast_beyond(10.0, 90.0)), signals(seed, amplitude=60.0)
     expected = loop(a, sp, pv, external_reset_with_fast_return(a.kp / a.ki))
     scale = 16 * 120 * (a.kp + a.kd / H + a.ki * H * 120)  # sums in another order, as above
     for one, other in zip(expected, states_of(program(a), sp, pv, "u", "I"), strict=True):
@@ -249,14 +279,13 @@ def test_from_beyond_its_own_limits_the_integral_comes_back_sixteen_times_as_fas
 def test_the_fast_return_ends_at_its_own_limit_and_never_begins_at_the_outputs() -> None:
     """I alone, an error of -10: 0.05 % a scan, 0.8 % above 90 %. Limits at those of the output are never exceeded."""
     sp, pv = np.array([60.0] * 2 + [40.0] * 40), np.full(42, 50.0)
-    a = Algorithm(series=False, kp=0.0, ki=0.01, kd=0.0, windup="external-reset", tracking_time=100.0)
 
-    def moves(beyond: tuple[float, float]) -> Floats:
-        gate = Gate(fast_return=16.0, fast_beyond=beyond)
-        return np.diff(outputs(build(replace(a, gate=gate), H, limits=(LOW, HIGH), initial_output=99.0), sp, pv))[1:]
+    def moves(low: float, high: float) -> Floats:
+        a = algorithm(ki=0.01, Ti=100.0, windup=fast_beyond(low, high))
+        return np.diff(outputs(build(a, H, limits=(LOW, HIGH), initial_output=99.0), sp, pv))[1:]
 
-    assert moves((0.0, 100.0)) == pytest.approx([-0.05] * 40, abs=1e-12)
-    fast = moves((10.0, 90.0))
+    assert moves(0.0, 100.0) == pytest.approx([-0.05] * 40, abs=1e-12)
+    fast = moves(10.0, 90.0)
     assert fast[:11] == pytest.approx([-0.8] * 11, abs=1e-12)  # 99.05 to 90.25
     assert fast[11] == pytest.approx(-0.25, abs=1e-12)
     assert fast[12:] == pytest.approx([-0.05] * 28, abs=1e-12)
@@ -266,21 +295,22 @@ def test_deltavs_limits_of_the_windup_are_levels_of_its_output_and_do_nothing_un
     card = pidemu.load_card("emerson/deltav")
     for structure in ("1", "2", "5", "6", "7"):
         plain = card.settings(GAIN=2, RESET=60, STRUCTURE=structure).algorithm()
-        assert (plain.windup, plain.gate) == ("external-reset", Gate())
+        assert plain.integral.windup == EXTERNAL_RESET
     given = card.settings(GAIN=2, RESET=60, ARW_HI_LIM=18, ARW_LO_LIM=5, op_range=(4, 20))
-    assert given.algorithm().gate == Gate(fast_return=16.0, fast_beyond=(6.25, 87.5))
-    assert given.algorithm().linear.gate == Gate()
+    assert given.algorithm().integral.windup == fast_beyond(6.25, 87.5)
+    assert given.algorithm().linear.integral.windup == EXTERNAL_RESET
     assert given.algorithm().beyond_the_law == ["integral 16 times as fast on the way back from below 6.25 or above 87.5"]
 
 
 def test_deltavs_nonlinear_gain_is_a_gap_of_p_and_i_and_its_filters_are_off_unless_they_are_given() -> None:
     card = pidemu.load_card("emerson/deltav")
     plain = card.settings(GAIN=2, RESET=60).algorithm()
-    assert (plain.shape, plain.pv_filter, plain.sp_filter) == (None, None, None)
+    assert (plain.error, plain.measurement.filter, plain.setpoint.filter) == (ErrorShape(), None, None)
     given = card.settings(GAIN=2, RESET=60, NL_GAP=3, NL_MINMOD=0.25, PV_FTIME=2, SP_FTIME=4)
     assert given.options["FRSIPID_OPTS"] == "nonlinear gain"
     a = given.algorithm()
-    assert (a.error, a.measurement.filter, a.setpoint.filter) == (Shape(kind="gap", band=3.0, gain=0.25), Lag(2.0), Lag(4.0))
+    assert a.error == ErrorShape(shape="gap", band=3.0, gain=0.25, linearity=1.0)
+    assert (a.measurement.filter, a.setpoint.filter) == (SignalFilter(time=2.0), SignalFilter(time=4.0))
 
 
 # --- external reset where P does not see the whole error ---------------------------------------------------------------
@@ -314,7 +344,7 @@ def test_positive_feedback_of_output_and_unseen_error_is_what_the_exact_solution
         F = F0 if start is None else exact[-1]
         exact.extend(solve_ivp(slope, (begin, end), [F], t_eval=at, rtol=1e-9, atol=1e-9, max_step=0.05).y[0])
     expected = np.clip(kp * np.array([unseen(x)[0] for x in t]) + exact, LOW, HIGH)
-    a = Algorithm(series=False, kp=kp, ki=K / Ti, kd=0.0, b=b, windup="external-reset", tracking_time=Ti)
+    a = algorithm(kp=kp, ki=K / Ti, b=b, Ti=Ti, windup=EXTERNAL_RESET)
     found = outputs(build(a, h, limits=(LOW, HIGH), initial_output=U0), r, y)
     assert expected.max() == HIGH
     assert expected.min() < HIGH
@@ -323,7 +353,7 @@ def test_positive_feedback_of_output_and_unseen_error_is_what_the_exact_solution
 
 @pytest.mark.parametrize("b", [0.0, 0.4, 1.0])
 def test_at_a_limit_the_sum_rests_the_gain_times_the_error_beyond_so_that_the_output_leaves_as_the_error_turns(b: float) -> None:
-    a = Algorithm(series=False, kp=2.0, ki=0.1, kd=0.0, b=b, windup="external-reset", tracking_time=20.0)
+    a = algorithm(kp=2.0, ki=0.1, b=b, Ti=20.0, windup=EXTERNAL_RESET)
     pv = np.concatenate([np.full(4000, 40.0), np.linspace(40.0, 60.0, 20_001)])  # the error turns very slowly, at 50 %
     sp = np.full(pv.size, 50.0)
     u, I = states_of(program(a), sp, pv, "u", "I")  # noqa: E741
@@ -336,7 +366,7 @@ def test_at_a_limit_the_sum_rests_the_gain_times_the_error_beyond_so_that_the_ou
 
 def test_integral_alone_leaves_the_limit_as_late_as_the_lag_of_what_rested_beyond_it() -> None:
     """``v - 100`` goes from ``K e1`` towards ``K e2`` in Ti: it is 0 after ``Ti ln((e1 - e2)/-e2)``, 60 ln 9 = 131.8 s."""
-    a = Algorithm(series=False, kp=0.0, ki=3.0 / 60.0, kd=0.0, windup="external-reset", tracking_time=60.0)
+    a = algorithm(ki=3.0 / 60.0, Ti=60.0, windup=EXTERNAL_RESET)
     sp, pv = np.full(5000, 60.0), np.array([20.0] * 4000 + [65.0] * 1000)
     u = outputs(build(a, H, limits=(LOW, HIGH), initial_output=U0), sp, pv)
     left = (int(np.argmax(u[4000:] < HIGH)) + 1) * H
@@ -373,7 +403,7 @@ def _ends(settings: pidemu.Settings, error: float) -> float:
     controller = pidemu.Controller(settings, output_limits=(0.0, 100.0), initial_output=50.0)
     scans = 400 if a.dahlin is not None else math.ceil(100.0 / abs(a.ki * controller.interval * error)) + 100
     scans = max(scans, 500)  # a setpoint with a rate limit starts at zero
-    scans *= 20 if a.error is not None and a.error.kind == "squared" else 2  # 7 % of the error count then
+    scans *= 20 if a.error.shape == "squared" else 2  # 7 % of the error count then
     controller.run(50.0, [50.0] * 3)
     return float(controller.run(50.0 + error, [50.0] * scans)[-1])
 
@@ -382,7 +412,7 @@ def _ends(settings: pidemu.Settings, error: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("windup", "expected"),
+    ("said", "expected"),
     [
         ({"tracking-time": "Ti"}, 8.0),
         ({"tracking-time": "sqrt(Ti Td)"}, 4.0),  # sqrt(kd/ki), with Ti = 8 s and Td = 2 s
@@ -393,21 +423,26 @@ def _ends(settings: pidemu.Settings, error: float) -> float:
     ],
     ids=str,
 )
-def test_the_tracking_time_of_a_card_is_what_it_says(windup: dict[str, Any], expected: float) -> None:
+def test_the_tracking_time_of_a_card_is_what_it_says(said: dict[str, Any], expected: float) -> None:
     dials = {"kp": ("gain", "%/%"), "ki": ("integral", "1/s"), "kd": ("derivative", "s"), "Tt": ("tracking-time", "s")}
     settings: dict[str, dict[str, Any]] = {name: {"sets": role, "unit": unit} for name, (role, unit) in dials.items()}
     settings["Tt"] |= {"off": 0, "default": 0}
-    card = made_up_card(integral={"rule": "backward", "windup": {"scheme": "back-calculation"} | windup}, settings=settings)
+    card = made_up_card(integral={"rule": "backward", "windup": {"scheme": "back-calculation"} | said}, settings=settings)
     given: dict[str, object] = {"kp": 2, "ki": 0.25, "kd": 4}
-    assert card.settings({**given, "Tt": 6}).algorithm().tracking_time == pytest.approx(expected, rel=1e-15)
-    if "when-off" in windup:
-        assert card.settings(given).algorithm().tracking_time == 8.0
+    assert tracking_time(card.settings({**given, "Tt": 6}).algorithm()) == pytest.approx(expected, rel=1e-15)
+    if "when-off" in said:
+        assert tracking_time(card.settings(given).algorithm()) == 8.0
+
+
+def tracking_time(a: Algorithm) -> float:
+    assert isinstance(a.integral.windup, WindupBackCalculation)
+    return float(a.integral.windup.Tt)
 
 
 # --- over all schemes ------------------------------------------------------------------------------------------------
 
 EVERY: dict[str, dict[str, Any]] = {name: how for name, (_, how) in SCHEMES.items()} | {
-    name: {"windup": name} for name in ("none", "clamp", "freeze", "conditional", "external-reset")
+    scheme.scheme: windup(scheme) for scheme in (NONE, CLAMP, FREEZE, CONDITIONAL, EXTERNAL_RESET)
 }
 
 
@@ -415,7 +450,7 @@ EVERY: dict[str, dict[str, Any]] = {name: how for name, (_, how) in SCHEMES.item
 @given(pid=pids, seed=seeds)
 def test_away_from_the_limits_every_scheme_integrates_the_error(name: str, pid: Algorithm, seed: int) -> None:
     """Once saturation has ended the integral grows by ``ki h e`` again: nothing of the saturation is left."""
-    a, (sp, pv) = replace(pid, **EVERY[name]), signals(seed, amplitude=60.0)
+    a, (sp, pv) = changed(pid, **EVERY[name]), signals(seed, amplitude=60.0)
     u, I = states_of(program(a), sp, pv, "u", "I")  # noqa: E741
     e, D = sp - pv, -a.kd * np.diff(pv, prepend=pv[0]) / H
     inner = a.kp * e + I
@@ -431,14 +466,14 @@ def test_away_from_the_limits_every_scheme_integrates_the_error(name: str, pid: 
 @given(pid=pids, seed=seeds)
 def test_the_output_is_inside_the_limits_whatever_the_scheme(name: str, pid: Algorithm, seed: int) -> None:
     sp, pv = signals(seed, amplitude=300.0)
-    u = outputs(program(replace(pid, **EVERY[name])), sp, pv)
+    u = outputs(program(changed(pid, **EVERY[name])), sp, pv)
     assert np.all((u >= LOW) & (u <= HIGH))
 
 
 @pytest.mark.parametrize("name", EVERY)
 @given(kp=st.floats(0.1, 10), seed=seeds)
 def test_a_proportional_controller_has_no_integral_that_a_scheme_could_move(name: str, kp: float, seed: int) -> None:
-    a, (sp, pv) = replace(PLAIN, kp=kp, ki=0.0, kd=0.0, **EVERY[name]), signals(seed, amplitude=60.0)
+    a, (sp, pv) = changed(PLAIN, kp=kp, ki=0.0, kd=0.0, Ti=0.0, **EVERY[name]), signals(seed, amplitude=60.0)
     p = program(a)
     assert "I" not in [q.name for q in p.states]
     assert outputs(p, sp, pv).tolist() == np.clip(kp * (sp - pv), LOW, HIGH).tolist()

@@ -125,9 +125,9 @@ def test_the_ramp_is_that_of_the_authors_own_test() -> None:
 def test_the_ramp_is_per_sample_where_intervals_are_stated_later() -> None:
     s = pidemu.load_card("gnc-tools/cpid").settings(Kp=1.0, rRampMax=2.0)
     assert s.algorithm().setpoint.rate == 20.0  # the card's interval is 0.1 s
-    assert s.algorithm(scan=0.5).sp_rate == 4.0
+    assert s.algorithm(scan=0.5).setpoint.rate == 4.0
     assert s.at_scan(0.25)["rRampMax"].to("eu/s") == 8.0
-    assert s.at_scan(0.25).algorithm().sp_rate == 8.0
+    assert s.at_scan(0.25).algorithm().setpoint.rate == 8.0
 
 
 def test_the_first_scan_kicks_when_there_is_a_derivative() -> None:

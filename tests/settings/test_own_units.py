@@ -91,7 +91,7 @@ def test_a_conversion_to_the_band_and_back_gives_the_same_band(tmp_path: Path) -
 def test_a_deadband_of_the_output_is_measured_by_the_output() -> None:
     s = pidemu.load_card("epics/epid").settings(KP=1, ODEL=1, pv_range=(0, 200), op_range=(0, 50))
     assert s.algorithm().output.deadband == 2  # 1 of 50
-    assert s.algorithm(own_units=True).output_deadband == 1
+    assert s.algorithm(own_units=True).output.deadband == 1
 
 
 SCANS: tuple[Edit, ...] = (

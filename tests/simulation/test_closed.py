@@ -191,7 +191,7 @@ def test_it_does_so_in_engineering_units(settings: Settings, process: str) -> No
     assert np.ptp(out) > 5
 
 
-@pytest.mark.parametrize("card_id", [c for c in CARDS if wanting(c).algorithm().precision == "float32"])
+@pytest.mark.parametrize("card_id", [c for c in CARDS if wanting(c).algorithm().arithmetic.type == "float32"])
 def test_the_process_of_a_float32_controller_is_computed_in_float64(card_id: str) -> None:
     out, pv = check(wanting(card_id), PROCESSES["underdamped"], **action_for(card_id))
     assert (pv != pv.astype(np.float32)).sum() > pv.size / 2
