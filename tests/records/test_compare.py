@@ -11,8 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.errors import RecordError, ScanError
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.sampling import Scale, sampled
 from pidemu.records.standard import StandardRecord, standard_record
 from pidemu.settings.settings import Settings

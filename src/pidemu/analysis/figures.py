@@ -16,13 +16,12 @@ import numpy.typing as npt
 
 from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.analysis.open_loop import PER_DECADE, OpenLoop, Picture, picture_of
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process
 from pidemu.settings.settings import Settings
-
-Floats = npt.NDArray[np.float64]
 
 SCANS_PER_TIME: Final = 20
 """By default, at least this many scans in the time in which the loop moves."""

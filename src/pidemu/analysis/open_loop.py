@@ -13,11 +13,10 @@ import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.analysis.stability import unstable_continuous, unstable_sampled
+from pidemu.arrays import Floats
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process
-
-Floats = npt.NDArray[np.float64]
 
 PER_DECADE: Final = 60
 _TURN: Final = 0.2

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.certificate.trials import NOISE, STEPS, Bench, Course, Plan
-from pidemu.records.files import Floats
 
 _BEYOND: Final = 0.6
 """The output starts so near to the limit that it would need this part of the way that it goes where nothing limits it."""

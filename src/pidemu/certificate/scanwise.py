@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.linear import time_scale
 from pidemu.certificate.models import EXACT, ScanByScan
@@ -19,8 +19,6 @@ from pidemu.records.sampling import Scale, controller_for
 from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
 from pidemu.settings.action import Action, acting_alike
 from pidemu.settings.settings import Settings
-
-Floats = npt.NDArray[np.float64]
 
 WIDE: Final = (-1e12, 1e12)
 """Output limits that no signal of the record reaches [%]."""

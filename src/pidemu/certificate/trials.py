@@ -9,11 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.certificate.scaled_controller import Side
 from pidemu.certificate.scanwise import WIDE
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for
 from pidemu.records.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record

@@ -11,6 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
     Output,
@@ -34,7 +35,7 @@ from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.formatting import json_safe
 from pidemu.plausible import plain_number
-from pidemu.records.files import Floats, Record, read_record, write_record
+from pidemu.records.files import Record, read_record, write_record
 from pidemu.records.playback import Playback, Timing, far_out, play, timing
 from pidemu.settings.action import Action
 

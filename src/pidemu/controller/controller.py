@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record
 from pidemu.card.model.around import Faults
 from pidemu.card.model.card_file import default_scan
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
-from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, stretches
+from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.plausible import INTERVAL, LEVEL, SIGNAL, number, plausible, shown
 from pidemu.program.builder import build

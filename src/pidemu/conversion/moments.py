@@ -14,8 +14,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.linear import bands
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.target import Numbers, Target
@@ -87,9 +87,9 @@ def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequen
     size = np.array(sizes(wanted.tolist()))
     free = np.flatnonzero(terms)
 
-    def missing(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        found: npt.NDArray[np.float64] = np.array(problem.law((x * size).tolist()).held_expansion(3))
-        apart: npt.NDArray[np.float64] = (wanted - found) / size
+    def missing(x: Floats) -> Floats:
+        found: Floats = np.array(problem.law((x * size).tolist()).held_expansion(3))
+        apart: Floats = (wanted - found) / size
         return apart
 
     x = np.where(terms, wanted / size, 0.0)
@@ -137,7 +137,7 @@ def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence
     """
     goal = complex(problem.wanted.held(w)[()])
 
-    def apart(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apart(x: Floats) -> Floats:
         ratio = complex(problem.law((start[0], *x)).held(w)[()]) / goal - 1
         return np.array([ratio.real, ratio.imag])
 
@@ -199,7 +199,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
     size = np.array(sizes(start)[1:])
     count = 2 if problem.target.has_derivative else 1
 
-    def apart(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apart(x: Floats) -> Floats:
         moments = (start[0], *(x * size[:count]), *start[1 + count :])
         try:
             found = P / (1 + sign * P * problem.law(moments).held(w))

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.card.model.base import Rule
 from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
-from pidemu.records.files import Floats
 from pidemu.records.playback import Timing
 from pidemu.records.sampling import Scale, controller_for
 from pidemu.settings.action import Action, carried_action, switch_position

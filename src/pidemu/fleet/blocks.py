@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice
 from pidemu.backends.runner import Block
 from pidemu.fleet.prepare import Prepared
@@ -18,7 +18,6 @@ from pidemu.simulation.outcome import late_scan
 from pidemu.simulation.simulate import run_trial
 from pidemu.simulation.trial import Trial
 
-Floats = npt.NDArray[np.float64]
 Room = Callable[[tuple[int, int, int]], Floats]
 """From the shape of a block's records to the array that takes them."""
 

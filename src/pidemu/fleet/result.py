@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FleetError, suggest
 from pidemu.files.tables import write_table
 from pidemu.fleet.blocks import COLUMNS, Outcome
@@ -22,7 +22,6 @@ from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
 from pidemu.simulation.trial import Trial
 
-Floats = npt.NDArray[np.float64]
 HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "settled", "stable", *MARGINS, "engine", "reason")
 """Columns of the table. Times are in seconds, signals in percent."""
 

@@ -10,8 +10,8 @@ from types import TracebackType
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import Outcome
@@ -22,7 +22,6 @@ from pidemu.fleet.writing import End, refuse_overlap
 
 _FAULTS: Final = 5
 """Damaged files that are named; there may be thousands."""
-Floats = npt.NDArray[np.float64]
 
 
 class SignalStore:

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
-from pidemu.records.files import Floats, Record, read_record
+from pidemu.records.files import Record, read_record
 from pidemu.records.playback import even_step
 from pidemu.records.sampling import Scale, limits_for, mode_segments
 from pidemu.records.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, run_on

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.controller.controller import Controller
 from pidemu.errors import RecordError
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import Timing, even_step, modes, spells, times_of, timing
 from pidemu.records.standard import Segment, StandardRecord, standard_record
 from pidemu.settings.action import Action

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pidemu.records.files import Floats, Record
+from pidemu.arrays import Floats
+from pidemu.records.files import Record
 from pidemu.records.playback import Playback, far_out, play
 from pidemu.records.sampling import Scale, controller_for, sampled
 from pidemu.records.standard import Segment

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.scanwise import WIDE
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
@@ -20,7 +20,6 @@ from pidemu.records.standard import REST, scale_of
 from pidemu.settings.action import acting_alike
 from pidemu.settings.settings import Settings
 
-Floats = npt.NDArray[np.float64]
 Who = Literal["source", "target", "textbook"]
 
 _POINTS: Final = 400

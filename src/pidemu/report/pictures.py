@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.figures import number
 from pidemu.law.rational import Response
 from pidemu.report.curves import Bode, ClosedLoops, Responses, Trace, Who
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = npt.NDArray[np.float64]
 
 _WIDTH: Final = 7.4
 """Width of all pictures [in]: that of the text on an A4 page."""

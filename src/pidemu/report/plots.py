@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
 from pidemu.files.writing import beside
 from pidemu.records.compare import Comparison
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import Playback, modes, spells
 from pidemu.records.side_by_side import dials
 from pidemu.records.standard import StandardRecord

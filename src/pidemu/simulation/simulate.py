@@ -6,11 +6,11 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pidemu.analysis.figures import loop_figures
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
 from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record, safe_runner
 from pidemu.backends.python import starting
 from pidemu.controller.controller import Controller
@@ -21,8 +21,6 @@ from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.experiment import integral_of_error
 from pidemu.simulation.trial import Step, Trial, first_scan, trial
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pidemu.analysis.figures import scan_for, settling_time
 from pidemu.analysis.open_loop import low_frequency_sign
+from pidemu.arrays import Floats
 from pidemu.controller.controller import Controller
 from pidemu.errors import ProcessError
 from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible, shown
@@ -24,7 +24,6 @@ from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.closed import closed_loop
 
-Floats = npt.NDArray[np.float64]
 Step = tuple[float, float]
 
 _DEFAULT_SCANS: Final = 50_000
