@@ -15,9 +15,8 @@ from pidemu.certificate.scaled_controller import Side
 from pidemu.controller.running import resting
 from pidemu.errors import PidemuError
 from pidemu.program.builder import build
-from pidemu.records.files import Record
-from pidemu.records.sampling import Scale
 from pidemu.records.standard import REST
+from pidemu.settings.ranges import UNLIMITED
 
 _KEPT: Final = ("I", "M", "Ir")
 """States that an integral is kept in: the sum; with whole numbers the output's sum and the remainder."""
@@ -26,7 +25,6 @@ _RANGE: Final = (1e-18, 50.0)
 _STEPS: Final = 50
 """Bisections: more than a float32 can tell apart."""
 _SCANS: Final = 6
-_FREE: Final = (-1e9, 1e9)
 _DIFFERS: Final = 0.01
 """Relative difference of smallest errors that is worth a word."""
 _MEASURED: Final = 1e-3
@@ -59,13 +57,12 @@ def smallest_error(side: Side) -> float:
         It cannot be emulated at this interval.
     """
     plain = replace(resting(side.own), shape=None, integral_deadband=None, integral_limits=None)
-    scale = Scale(side.settings)
-    program = build(plain, side.scan, limits=_FREE, initial_output=scale.output_own(50.0))
+    pv, op = side.settings.own_ranges
+    program = build(plain, side.scan, limits=UNLIMITED, initial_output=op.from_percent(REST))
     functions = compiled(program)
     names = [q.name for q in program.states]
     watched = [names.index(name) for name in _KEPT if name in names] or [names.index("u")]
-    rest = scale.own(Record(sp=np.array([REST, REST + 1.0]), pv=np.array([REST, REST])))
-    at, unit = float(rest.sp[0]), float(rest.sp[1] - rest.sp[0])
+    at, unit = pv.from_percent(REST), pv.change_from_percent(1.0)
 
     def moves(error: float) -> bool:
         state, sp = list(functions.initial), at + error * unit

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 
 from pidemu.algorithm.model import Shape
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side, alike, unlimited
+from pidemu.certificate.scaled_controller import Side, alike
+from pidemu.settings.ranges import infinite_where_none
 
 Figures = dict[str, tuple[float, float]]
 Pair = tuple[float, float]
@@ -60,10 +61,9 @@ def _integral_limits(side: Side) -> Pair:
     a = side.own
     if a.integral_limits is None:
         return -math.inf, math.inf
-    given = unlimited((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
+    given = infinite_where_none((_or(a.integral_limits[0], side.limits[0]), _or(a.integral_limits[1], side.limits[1])))
     gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.holds]
-    zero = side.settings.own_ranges[1].low
-    low, high = sorted((gain * x - zero) * side.op_percent for x in given)
+    low, high = sorted(side.op.in_percent(gain * x) for x in given)
     return low, high
 
 
@@ -78,7 +78,9 @@ def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifferenc
         "error: gain within the band [-]": _of(source, target, lambda side: _gap(side).gain if _band(side) else 1.0),
         "error: where a gain that grows with it is 1 [% of PV span]": _of(source, target, _over),
         "error: gain near zero [-]": _of(source, target, _linearity),
-        "integral deadband [% of PV span]": _of(source, target, lambda side: (side.own.integral_deadband or 0.0) * side.pv_percent),
+        "integral deadband [% of PV span]": _of(
+            source, target, lambda side: side.pv.change_in_percent(side.own.integral_deadband or 0.0)
+        ),
     }
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     shapes = [side.own.shape for side in (source, target)]
@@ -92,11 +94,11 @@ def _gap(side: Side) -> Shape:
 
 
 def _band(side: Side) -> float:
-    return _gap(side).band * side.pv_percent if _gap(side).kind == "gap" else 0.0
+    return side.pv.change_in_percent(_gap(side).band) if _gap(side).kind == "gap" else 0.0
 
 
 def _over(side: Side) -> float:
-    return _gap(side).over * side.pv_percent if _gap(side).kind != "gap" else math.inf
+    return side.pv.change_in_percent(_gap(side).over) if _gap(side).kind != "gap" else math.inf
 
 
 def _linearity(side: Side) -> float:
@@ -113,7 +115,7 @@ def _fine_print(shape: Shape | None) -> tuple[object, ...]:
 
 
 def _error_words(side: Side) -> str:
-    shape, band = side.own.shape, (side.own.integral_deadband or 0.0) * side.pv_percent
+    shape, band = side.own.shape, side.pv.change_in_percent(side.own.integral_deadband or 0.0)
     still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
     if shape is None:
         return still or "uses it as it is"
@@ -136,9 +138,9 @@ def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifferen
         "output",
         (source, target),
         {
-            "output rate limit [%/s]": _of(source, target, lambda side: side.own.output_rate * side.op_percent),
-            "output deadband [%]": _of(source, target, lambda side: side.own.output_deadband * side.op_percent),
-            "output step [%]": _of(source, target, lambda side: side.own.resolution * side.op_percent),
+            "output rate limit [%/s]": _of(source, target, lambda side: side.op.change_in_percent(side.own.output_rate)),
+            "output deadband [%]": _of(source, target, lambda side: side.op.change_in_percent(side.own.output_deadband)),
+            "output step [%]": _of(source, target, lambda side: side.op.change_in_percent(side.own.resolution)),
         },
         [],
     )
@@ -161,7 +163,10 @@ def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False
     ]
     free = [in_cascade and side.own.sp_rate_local for side in (source, target)]
     up, down = (
-        tuple(math.inf if none else rate * side.pv_percent for none, rate, side in zip(free, rates, (source, target), strict=True))
+        tuple(
+            math.inf if none else side.pv.change_in_percent(rate)
+            for none, rate, side in zip(free, rates, (source, target), strict=True)
+        )
         for rates in ([s.own.sp_rate for s in (source, target)], [s.own.sp_rate_down for s in (source, target)])
     )
     rates = {"setpoint rate limit [%/s]": (up[0], up[1]), "setpoint rate limit downwards [%/s]": (down[0], down[1])}

@@ -11,7 +11,7 @@ from pidemu.certificate.limit_shift import limit_shift
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.recovery import Recoveries, Recovery, recoveries
 from pidemu.certificate.scaled_controller import Side
-from pidemu.certificate.trials import Bench, Plan
+from pidemu.certificate.trials import Plan, TriedController
 
 _TRACKING: Final = 0.01
 """Relative difference of tracking times that counts."""
@@ -19,7 +19,9 @@ _MORE: Final = 2.0
 """With noise the outputs are so many times further apart than without, where that is worth another sentence."""
 
 
-def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], plan: Plan) -> Iterator[NonlinearDifference]:
+def windup_differences(
+    both: tuple[Side, Side], tried: tuple[TriedController, TriedController], plan: Plan
+) -> Iterator[NonlinearDifference]:
     """Yield how differently two controllers come back from an output limit, by emulation; nothing where they do not.
 
     Without integral action in both, what an excursion to a limit and back leaves behind.
@@ -28,7 +30,7 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     ----------
     both : tuple of Side
         Source and target.
-    benches : tuple of Bench
+    tried : tuple of TriedController
         The same, to be tried.
     plan : Plan
         What is tried.
@@ -43,7 +45,7 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     if not (source.integrates or target.integrates):
         yield from _without_integral(both, scans)
         return
-    found = recoveries(benches, plan, scans)
+    found = recoveries(tried, plan, scans)
     if not found.differ:
         return
     figures = {

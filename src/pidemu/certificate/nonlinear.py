@@ -11,9 +11,9 @@ from pidemu.certificate.differences import error_differences, limit_differences,
 from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.scaled_controller import Side, sides
-from pidemu.certificate.trials import Bench, Plan, planned
+from pidemu.certificate.trials import Plan, TriedController, planned
+from pidemu.controller.bench import limits_in_percent
 from pidemu.errors import PidemuError
-from pidemu.records.sampling import limits_for
 from pidemu.settings.action import acting_alike
 from pidemu.settings.range_relation import Relation, relation
 from pidemu.settings.settings import Settings
@@ -76,7 +76,7 @@ def nonlinear_differences(
     (0.0, -4.04)
     """
     both = sides(source, target, scans)
-    trial = planned(both, time_and_size, limits_for(source, None, (0.0, 100.0)) if limits is None else limits)
+    trial = planned(both, time_and_size, limits_in_percent(source, None) if limits is None else limits)
     found = [
         *_emulated(both, trial),
         *_bias(*both),
@@ -94,26 +94,28 @@ def _emulated(both: tuple[Side, Side], trial: Plan) -> Iterator[NonlinearDiffere
     source, target = both
     related = relation(source.settings.pv_range, target.settings.pv_range, "pv_range")
     span = 1 / float(related.factor) if isinstance(related, Relation) else 1.0
-    benches = []
+    tried = []
     try:
         actions = acting_alike(target.settings, source.sign * target.sign)
         for side, action, share in zip(both, actions, (1.0, span), strict=True):
             name = side.name
-            benches.append(Bench(side, trial, action, share))
-            benches[-1].check()
+            tried.append(TriedController(side, trial, action, share))
+            tried[-1].check()
     except PidemuError as error:
         reason = f"{name} cannot be emulated: {error}"
         yield from unknown_windup(both, reason)
         yield from _unknown_transfer(both, reason)
         return
-    pair = benches[0], benches[1]
+    pair = tried[0], tried[1]
     yield from windup_differences(both, pair, trial)
     yield from _transfer(both, pair, trial)
 
 
-def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan) -> Iterator[NonlinearDifference]:
+def _transfer(
+    both: tuple[Side, Side], tried: tuple[TriedController, TriedController], trial: Plan
+) -> Iterator[NonlinearDifference]:
     """Yield how differently the transfers between manual and automatic go (section 6)."""
-    (hand, auto), (new_hand, new_auto) = (bench.transfers() for bench in benches)
+    (hand, auto), (new_hand, new_auto) = (one.transfers() for one in tried)
     to_auto, to_manual = (auto, new_auto), (hand, new_hand)
     least = _BUMP if all(side.own.precision == "float64" for side in both) else _ROUNDED_BUMP
     parts = []

@@ -238,8 +238,7 @@ class Controller:
         sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
-        last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
-        self._running.take_over({"u": float(output)}, last)
+        last = self._running.rest(float(sp), float(pv), float(output))
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
 

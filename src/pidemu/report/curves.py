@@ -9,7 +9,6 @@ from typing import Final, Literal
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.certificate.scanwise import WIDE
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.law.law import Law
@@ -18,6 +17,7 @@ from pidemu.records.files import Record
 from pidemu.records.side_by_side import run_on
 from pidemu.records.standard import REST, scale_of
 from pidemu.settings.action import acting_alike
+from pidemu.settings.ranges import UNLIMITED
 from pidemu.settings.settings import Settings
 
 Who = Literal["source", "target", "textbook"]
@@ -207,7 +207,7 @@ def _trace(
     still = np.full(times.size, REST)
     record = Record(sp=moved, pv=still) if moves == "setpoint" else Record(sp=still, pv=moved)
     action = acting_alike(c.settings, c.factor)[0 if who == "source" else 1]
-    run = run_on(record, moves, settings, who, (h, h), action, WIDE, REST, [])
+    run = run_on(record, moves, settings, who, (h, h), action, UNLIMITED, REST, [])
     factor = abs(c.factor) if who == "source" else 1.0
     outputs: Floats = REST + factor * (run.playback.outputs - REST)
     return Trace(who, times, outputs)
@@ -256,7 +256,7 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
             setpoint=(first, _STEP),
             load=(then, _STEP / factor),
             time=2.1 * shown,
-            output_limits=WIDE,
+            output_limits=UNLIMITED,
         )
         measurement.append(Trace(who, run.times, run.measurement))
         output.append(Trace(who, run.times, REST + factor * (run.output - REST)))

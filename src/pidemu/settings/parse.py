@@ -12,7 +12,7 @@ from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, Quantity, number, shown
-from pidemu.settings.ranges import RANGES, SignalRange, read_range
+from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range
 from pidemu.settings.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import (
     LEVELS,
@@ -129,7 +129,7 @@ def signal_range(card: Card, name: str, given: object) -> SignalRange | None:
 def _output_range(equation: Equation) -> SignalRange | None:
     """Return the output's range where it is the card's: a band, or a gain in % of output, moves it over just that."""
     units = [parse_unit(s.unit).dimension for s in equation.settings.values() if s.sets == "gain"]
-    known = equation.signals == "engineering" and all(map(math.isfinite, equation.output.limits))
+    known = equation.signals == "engineering" and are_limits(equation.output.limits)
     return SignalRange(*equation.output.limits) if known and units and units[0] in _OF_WHOLE_OUTPUT else None
 
 
