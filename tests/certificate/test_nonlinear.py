@@ -16,8 +16,8 @@ from pidemu.certificate import limit_test as windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.recovery import Recoveries, Recovery
-from pidemu.certificate.scaled_controller import sides
-from pidemu.certificate.trials import Plan, TriedController
+from pidemu.certificate.scaled_controller import scaled_controllers
+from pidemu.certificate.trials import TrialPlan, TriedController
 from pidemu.controller.bench import limits_in_percent
 from pidemu.records.standard import scale_of, standard_record
 from pidemu.settings.settings import Settings
@@ -132,7 +132,7 @@ def test_noise_and_derivative_at_a_limit_show_what_steps_do_not() -> None:
     assert outputs[1][worst] - outputs[0][worst] > 30
     pair = Recovery(100, True, 0.0, 50.0), Recovery(100, True, 0.0, 50.0)
     alike = Recoveries(pair, short=False, late=False, apart=False, noisy=(1.25, 40.5), noisy_at=57.0)
-    assert windup.story(alike, Plan(60.0, 4.0, (0.0, 100.0)), sides(source, target, (1.0, 1.0))) == (
+    assert windup.story(alike, TrialPlan(60.0, 4.0, (0.0, 100.0)), scaled_controllers(source, target, (1.0, 1.0))) == (
         "Coming back from 0 % along a ramp of PV with noise of 0.5 %, 57 s after PV has turned, the output is 1.25 % on the old "
         "controller and 40.5 % on the new one; without noise they are alike."
     )

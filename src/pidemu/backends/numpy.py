@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats, Integers
-from pidemu.backends.numpy_text import Plan, planned
+from pidemu.backends.numpy_text import BlockPlan, planned
 from pidemu.backends.numpy_values import scan_of
 from pidemu.backends.python import in_precision
 from pidemu.backends.runner import Block, Run, Runner
@@ -59,7 +59,7 @@ def block(structure: Structure) -> Block:
     return run
 
 
-def _scans(program: Program) -> tuple[Plan, Callable[..., list[_Array]]]:
+def _scans(program: Program) -> tuple[BlockPlan, Callable[..., list[_Array]]]:
     scan = scan_of(program)
     plan = planned(scan)
     ufuncs = {v.what for i, v in enumerate(scan.values) if scan.computed(i)} - {"copy", "select"} | {"logical_not"}

@@ -11,7 +11,7 @@ import numpy as np
 
 from pidemu.backends.python import compiled
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side
+from pidemu.certificate.scaled_controller import ScaledController
 from pidemu.controller.running import resting
 from pidemu.errors import PidemuError
 from pidemu.program.builder import build
@@ -33,7 +33,7 @@ _NEGLIGIBLE: Final = 1e-4
 """Below this no digits are given [% of span]."""
 
 
-def smallest_error(side: Side) -> float:
+def smallest_error(side: ScaledController) -> float:
     """Return the smallest error that still integrates with the output at 50 % [% of the measurement span].
 
     It is found by emulation, with the setpoint above a measurement of 50 %: the controller's own program starts in the steady state
@@ -43,7 +43,7 @@ def smallest_error(side: Side) -> float:
 
     Parameters
     ----------
-    side : Side
+    side : ScaledController
         A controller with integral action.
 
     Returns
@@ -82,7 +82,7 @@ def smallest_error(side: Side) -> float:
     return math.exp(moving)
 
 
-def arithmetic_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def arithmetic_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield the smallest errors that two controllers integrate, where these differ and one is large enough to be measured."""
     both = (source, target)
     precisions = [side.own.precision for side in both]

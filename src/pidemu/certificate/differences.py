@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator
 
 from pidemu.algorithm.model import Shape
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side, alike
+from pidemu.certificate.scaled_controller import ScaledController, alike
 from pidemu.settings.ranges import infinite_where_none
 
 Figures = dict[str, tuple[float, float]]
 Pair = tuple[float, float]
 
 
-def limit_differences(source: Side, target: Side, *, stated: bool = False) -> Iterator[NonlinearDifference]:
+def limit_differences(source: ScaledController, target: ScaledController, *, stated: bool = False) -> Iterator[NonlinearDifference]:
     """Yield how output limits as delivered, unless others are `stated`, and limits of the integral itself differ (section 5)."""
     both = (source, target)
     figures: Figures = {}
@@ -38,7 +38,7 @@ def limit_differences(source: Side, target: Side, *, stated: bool = False) -> It
         yield NonlinearDifference("limits", " ".join(parts), figures)
 
 
-def _in_own_units(target: Side) -> str:
+def _in_own_units(target: ScaledController) -> str:
     """Return what 0 to 100 % is on a target that computes in engineering units."""
     if not target.engineering:
         return ""
@@ -56,7 +56,7 @@ def _span(limits: Pair, unit: str) -> str:
     return f"{low:g} to {high:g} {unit}"
 
 
-def _integral_limits(side: Side) -> Pair:
+def _integral_limits(side: ScaledController) -> Pair:
     """Return the limits of the integral term [% of the output span]; infinite where there are none."""
     a = side.own
     if a.integral_limits is None:
@@ -71,7 +71,7 @@ def _or(limit: float | None, instead: float) -> float:
     return instead if limit is None else limit
 
 
-def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def error_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield what is done to the error, and where the integral stands still for it."""
     figures = {
         "error: half width of the band [% of PV span]": _of(source, target, _band),
@@ -89,19 +89,19 @@ def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifferenc
         yield NonlinearDifference("error", f"The error is used differently: {words}.", found)
 
 
-def _gap(side: Side) -> Shape:
+def _gap(side: ScaledController) -> Shape:
     return side.own.shape or Shape("gap")
 
 
-def _band(side: Side) -> float:
+def _band(side: ScaledController) -> float:
     return side.pv.change_in_percent(_gap(side).band) if _gap(side).kind == "gap" else 0.0
 
 
-def _over(side: Side) -> float:
+def _over(side: ScaledController) -> float:
     return side.pv.change_in_percent(_gap(side).over) if _gap(side).kind != "gap" else math.inf
 
 
-def _linearity(side: Side) -> float:
+def _linearity(side: ScaledController) -> float:
     """Return the gain near zero of a shape that has no band."""
     shape = side.own.shape
     return 1.0 if shape is None or shape.kind == "gap" else 0.0 if shape.kind == "squared" else shape.linearity
@@ -114,7 +114,7 @@ def _fine_print(shape: Shape | None) -> tuple[object, ...]:
     return shape.kind, shape.subtracted, shape.zero_crossing, shape.on_integral, shape.on_proportional
 
 
-def _error_words(side: Side) -> str:
+def _error_words(side: ScaledController) -> str:
     shape, band = side.own.shape, side.pv.change_in_percent(side.own.integral_deadband or 0.0)
     still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
     if shape is None:
@@ -132,7 +132,7 @@ def _error_words(side: Side) -> str:
     return f"{text}{where}{' and ' + still if still else ''}"
 
 
-def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def output_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield rate limit, deadband and step of the output where they differ."""
     yield from _numbers(
         "output",
@@ -146,7 +146,9 @@ def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifferen
     )
 
 
-def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False) -> Iterator[NonlinearDifference]:
+def setpoint_differences(
+    source: ScaledController, target: ScaledController, *, in_cascade: bool = False
+) -> Iterator[NonlinearDifference]:
     """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual.
 
     With `in_cascade` the remote setpoint alone counts, which some do not limit.
@@ -175,11 +177,13 @@ def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False
     yield from _numbers("setpoint", (source, target), rates, words)
 
 
-def _from_zero(side: Side) -> bool:
+def _from_zero(side: ScaledController) -> bool:
     return side.own.sp_from_zero and math.isfinite(side.own.sp_rate)
 
 
-def _numbers(aspect: str, both: tuple[Side, Side], figures: Figures, words: list[str]) -> Iterator[NonlinearDifference]:
+def _numbers(
+    aspect: str, both: tuple[ScaledController, ScaledController], figures: Figures, words: list[str]
+) -> Iterator[NonlinearDifference]:
     """Yield the figures that differ as one difference, with further sentences."""
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     parts = []
@@ -195,7 +199,7 @@ def _or_none(x: float, unit: str) -> str:
     return f"{x:.4g} {unit}" if x and math.isfinite(x) else "none"
 
 
-def _of(source: Side, target: Side, number: Callable[[Side], float]) -> Pair:
+def _of(source: ScaledController, target: ScaledController, number: Callable[[ScaledController], float]) -> Pair:
     return number(source), number(target)
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pidemu.card.load import Card
-from pidemu.certificate.scaled_controller import Side, sides
+from pidemu.certificate.scaled_controller import ScaledController, scaled_controllers
 from pidemu.controller.bench import Bench, limits_in_percent
 from pidemu.records.standard import REST
 from pidemu.settings.settings import Settings
@@ -127,7 +127,7 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     >>> (found.source, found.target, found.permanent)
     (50.0, 20.0, True)
     """
-    both = sides(source, target, scans)
+    both = scaled_controllers(source, target, scans)
     low, high = limits_in_percent(source, None)
     gain = abs(source.law().moments()[1])
     move = min(_MOVE * (high - low) / 100, _ERROR * gain)
@@ -137,7 +137,7 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     return LimitShift(error, start, high, ends[0], ends[1], both[0].integrates, both[1].integrates)
 
 
-def _after(side: Side, error: float, start: float, limits: tuple[float, float]) -> float:
+def _after(side: ScaledController, error: float, start: float, limits: tuple[float, float]) -> float:
     """Return the output [% of its span] after the measurement has moved by `error`, such that the output rises, and come back."""
     a = side.own
     times = (abs(a.kd / a.kp) if a.kp else 0.0) + a.Tf + sum(f.at(side.scan) for f in (a.pv_filter, a.e_filter) if f is not None)

@@ -10,8 +10,8 @@ from pidemu.card.datasheet.at_limits import limit_rows
 from pidemu.certificate.limit_shift import limit_shift
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.recovery import Recoveries, Recovery, recoveries
-from pidemu.certificate.scaled_controller import Side
-from pidemu.certificate.trials import Plan, TriedController
+from pidemu.certificate.scaled_controller import ScaledController
+from pidemu.certificate.trials import TrialPlan, TriedController
 
 _TRACKING: Final = 0.01
 """Relative difference of tracking times that counts."""
@@ -20,7 +20,7 @@ _MORE: Final = 2.0
 
 
 def windup_differences(
-    both: tuple[Side, Side], tried: tuple[TriedController, TriedController], plan: Plan
+    both: tuple[ScaledController, ScaledController], tried: tuple[TriedController, TriedController], plan: TrialPlan
 ) -> Iterator[NonlinearDifference]:
     """Yield how differently two controllers come back from an output limit, by emulation; nothing where they do not.
 
@@ -28,11 +28,11 @@ def windup_differences(
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
     tried : tuple of TriedController
         The same, to be tried.
-    plan : Plan
+    plan : TrialPlan
         What is tried.
 
     Raises
@@ -57,7 +57,7 @@ def windup_differences(
     yield NonlinearDifference("windup", story(found, plan, both), figures)
 
 
-def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
+def _without_integral(both: tuple[ScaledController, ScaledController], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
     """Yield what a limit leaves behind for good."""
     source, target = both
     gains = [abs(side.settings.law().moments()[1]) for side in both]
@@ -67,12 +67,12 @@ def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> It
         yield NonlinearDifference("windup", shift.text, figures)
 
 
-def unknown_windup(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDifference]:
+def unknown_windup(both: tuple[ScaledController, ScaledController], reason: str) -> Iterator[NonlinearDifference]:
     """Yield what the cards say where the two cannot be emulated and their schemes are not the same.
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
     reason : str
         Why they cannot be.
@@ -84,27 +84,27 @@ def unknown_windup(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDi
     yield NonlinearDifference("windup", text, {})
 
 
-def _same_scheme(mine: Side, other: Side) -> bool:
+def _same_scheme(mine: ScaledController, other: ScaledController) -> bool:
     a, b = mine.own, other.own
     alike = (a.windup, a.gate, a.implicit_tracking) == (b.windup, b.gate, b.implicit_tracking)
     return alike and (a.windup != "back-calculation" or math.isclose(a.tracking_time, b.tracking_time, rel_tol=_TRACKING))
 
 
-def _scheme(side: Side) -> str:
+def _scheme(side: ScaledController) -> str:
     """Return what happens at a limit, as the data sheet has it."""
     return dict(limit_rows(side.settings.equation))["at a limit"]
 
 
-def story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
+def story(found: Recoveries, plan: TrialPlan, both: tuple[ScaledController, ScaledController]) -> str:
     """Return the differences as sentences with times.
 
     Parameters
     ----------
     found : Recoveries
         What both did.
-    plan : Plan
+    plan : TrialPlan
         What was tried.
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
     """
     old, new = found.both
@@ -154,11 +154,11 @@ def _on_each(outputs: tuple[float, float]) -> str:
     return f"{output_number(outputs[0])} % on the old controller and {output_number(outputs[1])} % on the new one"
 
 
-def _leaves(r: Recovery, plan: Plan) -> str:
+def _leaves(r: Recovery, plan: TrialPlan) -> str:
     if math.isinf(r.stays):
         return f"stays there for the {3 * plan.time:.4g} s that this lasts"
     return f"leaves the limit after {r.stays:.4g} s" if r.stays else "leaves the limit at once"
 
 
-def _both(r: Recovery, plan: Plan) -> str:
+def _both(r: Recovery, plan: TrialPlan) -> str:
     return _leaves(r, plan).replace("leaves", "leave", 1).replace("stays", "stay", 1)

@@ -10,8 +10,8 @@ from pidemu.certificate.arithmetic import arithmetic_differences
 from pidemu.certificate.differences import error_differences, limit_differences, output_differences, setpoint_differences
 from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side, sides
-from pidemu.certificate.trials import Plan, TriedController, planned
+from pidemu.certificate.scaled_controller import ScaledController, scaled_controllers
+from pidemu.certificate.trials import TrialPlan, TriedController, planned
 from pidemu.controller.bench import limits_in_percent
 from pidemu.errors import PidemuError
 from pidemu.settings.action import acting_alike
@@ -75,7 +75,7 @@ def nonlinear_differences(
     >>> round(before, 9), round(after, 9)  # the error is half the size, with the measurement above the setpoint; P comes on top
     (0.0, -4.04)
     """
-    both = sides(source, target, scans)
+    both = scaled_controllers(source, target, scans)
     trial = planned(both, time_and_size, limits_in_percent(source, None) if limits is None else limits)
     found = [
         *_emulated(both, trial),
@@ -89,7 +89,7 @@ def nonlinear_differences(
     return tuple(found)
 
 
-def _emulated(both: tuple[Side, Side], trial: Plan) -> Iterator[NonlinearDifference]:
+def _emulated(both: tuple[ScaledController, ScaledController], trial: TrialPlan) -> Iterator[NonlinearDifference]:
     """Yield what differs at limits and transfers, or what the cards say of it where it cannot be tried."""
     source, target = both
     related = relation(source.settings.pv_range, target.settings.pv_range, "pv_range")
@@ -112,7 +112,7 @@ def _emulated(both: tuple[Side, Side], trial: Plan) -> Iterator[NonlinearDiffere
 
 
 def _transfer(
-    both: tuple[Side, Side], tried: tuple[TriedController, TriedController], trial: Plan
+    both: tuple[ScaledController, ScaledController], tried: tuple[TriedController, TriedController], trial: TrialPlan
 ) -> Iterator[NonlinearDifference]:
     """Yield how differently the transfers between manual and automatic go (section 6)."""
     (hand, auto), (new_hand, new_auto) = (one.transfers() for one in tried)
@@ -134,7 +134,7 @@ def _transfer(
         yield NonlinearDifference("transfer", " ".join(parts), figures)
 
 
-def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDifference]:
+def _unknown_transfer(both: tuple[ScaledController, ScaledController], reason: str) -> Iterator[NonlinearDifference]:
     """Yield what the cards say where the transfers cannot be tried."""
     ways = [f"{STARTS[side.own.start]}; in manual it {_MANUAL[side.own.manual_output]}" for side in both]
     if ways[0] != ways[1]:
@@ -144,7 +144,7 @@ def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[Nonlinea
         )
 
 
-def _each(both: tuple[Side, Side], words: list[str]) -> str:
+def _each(both: tuple[ScaledController, ScaledController], words: list[str]) -> str:
     """Return what each does, in brackets; nothing where it is the same."""
     if words[0] == words[1]:
         return ""
@@ -155,7 +155,7 @@ def _jumps(bumps: tuple[float, float]) -> str:
     return f"{output_number(bumps[0])} % on the old controller and {output_number(bumps[1])} % on the new one"
 
 
-def _bias(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def _bias(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield that the output of a positional target without integral rests on a bias, which no dial of the source holds."""
     if target.integrates or target.own.velocity or target.own.dahlin is not None or source.own.bias:
         return

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.certificate.trials import NOISE, STEPS, Course, Plan, TriedController
+from pidemu.certificate.trials import NOISE, STEPS, Course, TrialPlan, TriedController
 
 _BEYOND: Final = 0.6
 """The output starts so near to the limit that it would need this part of the way that it goes where nothing limits it."""
@@ -77,7 +77,7 @@ class Recoveries:
         return self.short or self.late or self.apart or self.noisy is not None
 
 
-def recoveries(tried: tuple[TriedController, TriedController], plan: Plan, scans: tuple[float, float]) -> Recoveries:
+def recoveries(tried: tuple[TriedController, TriedController], plan: TrialPlan, scans: tuple[float, float]) -> Recoveries:
     """Return how both come back from a limit.
 
     Each is at rest first; then the measurement alone makes the error. Both are run without limits as well: what their linear laws
@@ -87,7 +87,7 @@ def recoveries(tried: tuple[TriedController, TriedController], plan: Plan, scans
     ----------
     tried : tuple of TriedController
         Source and target.
-    plan : Plan
+    plan : TrialPlan
         Time, size and limits.
     scans : tuple of float
         Scan intervals [s].
@@ -117,7 +117,7 @@ def recoveries(tried: tuple[TriedController, TriedController], plan: Plan, scans
 
 
 def _free(
-    tried: tuple[TriedController, TriedController], plan: Plan, part: tuple[str, str], until: float
+    tried: tuple[TriedController, TriedController], plan: TrialPlan, part: tuple[str, str], until: float
 ) -> tuple[list[Course], float]:
     """Return what both do without limits, and the way to the limit [% of the output span]: as far as both go beyond."""
     free = [b.course(part, plan.middle, limited=False) for b in tried]
@@ -132,7 +132,7 @@ def _at(course: Course, time: float) -> float:
     return float(outputs[np.searchsorted(times, time - _HAIR * (times[1] - times[0])) - 1])
 
 
-def _recovery(course: Course, plan: Plan) -> Recovery:
+def _recovery(course: Course, plan: TrialPlan) -> Recovery:
     times, outputs = course
     step, (low, high) = float(times[1] - times[0]), plan.limits
     turn, zero, back = (np.searchsorted(times, t - _HAIR * step) for t in (2 * plan.time, _turned(plan), 5 * plan.time))
@@ -146,12 +146,12 @@ def _recovery(course: Course, plan: Plan) -> Recovery:
     return Recovery(reached, True, math.inf if off >= held.size else off * step, float(outputs[-1]))
 
 
-def _turned(plan: Plan) -> float:
+def _turned(plan: TrialPlan) -> float:
     """Return when the error has the other sign [s]."""
     return 2 * plan.time + plan.ramp / 2
 
 
-def _noisy(tried: tuple[TriedController, TriedController], plan: Plan, low: float) -> tuple[tuple[float, float] | None, float]:
+def _noisy(tried: tuple[TriedController, TriedController], plan: TrialPlan, low: float) -> tuple[tuple[float, float] | None, float]:
     """Return outputs on the way back from the limit with noise where they are furthest apart, and when [s]."""
     free, way = _free(tried, plan, NOISE, 3.0)
     found = [b.course(NOISE, min(plan.middle, low + way), limited=True) for b in tried]

@@ -11,7 +11,7 @@ from pidemu.settings.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ScaledController:
     """One of two controllers.
 
     Attributes
@@ -72,11 +72,11 @@ class Side:
         return "engineering units" if self.engineering else "%"
 
 
-def sides(source: Settings, target: Settings, scans: tuple[float, float]) -> tuple[Side, Side]:
+def scaled_controllers(source: Settings, target: Settings, scans: tuple[float, float]) -> tuple[ScaledController, ScaledController]:
     """Return source and target at their scan intervals [s]."""
     names = ("the source", "the target") if source.card.id == target.card.id else (source.card.id, target.card.id)
     both = zip(names, (source, target), scans, strict=True)
-    first, second = (Side(name, s, h, s.algorithm(own_units=True, scan=h)) for name, s, h in both)
+    first, second = (ScaledController(name, s, h, s.algorithm(own_units=True, scan=h)) for name, s, h in both)
     return first, second
 
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.certificate.scaled_controller import Side
+from pidemu.certificate.scaled_controller import ScaledController
 from pidemu.controller.bench import Bench
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
@@ -37,7 +37,7 @@ Course = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrialPlan:
     """What is tried.
 
     Attributes
@@ -71,12 +71,14 @@ class Plan:
         return sum(self.limits) / 2
 
 
-def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
+def planned(
+    both: tuple[ScaledController, ScaledController], time_and_size: tuple[float, float], limits: tuple[float, float]
+) -> TrialPlan:
     """Return what to try: with this time and size, or with another time where that takes too many scans, or too few.
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target; the source sets the size that goes with another time.
     time_and_size : tuple of float
         Characteristic time [s] and size [%].
@@ -92,7 +94,7 @@ def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits:
     elif time < shortest:
         time, size = scale_of(source, max(scans))
     derivative = max(abs(side.own.kd / side.own.kp) if side.own.kp else abs(side.own.kd) * time for side in both)
-    return Plan(time, size, limits, min(_SLOW * derivative, time / 2))
+    return TrialPlan(time, size, limits, min(_SLOW * derivative, time / 2))
 
 
 class TriedController:
@@ -100,9 +102,9 @@ class TriedController:
 
     Parameters
     ----------
-    side : Side
+    side : ScaledController
         The controller.
-    plan : Plan
+    plan : TrialPlan
         What is tried.
     action : {"reverse", "direct"}
         Control action.
@@ -115,7 +117,7 @@ class TriedController:
         It cannot be emulated at this interval.
     """
 
-    def __init__(self, side: Side, plan: Plan, action: Action, span: float) -> None:
+    def __init__(self, side: ScaledController, plan: TrialPlan, action: Action, span: float) -> None:
         if plan.time > _TOO_MANY * side.scan:
             raise ScanError(
                 f"its scan interval of {side.scan:g} s is too short beside the other's; give intervals nearer to each other"

@@ -14,7 +14,7 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
-    Output,
+    OutputArgument,
     action_option,
     asked_for,
     assignments,
@@ -71,13 +71,17 @@ from pidemu.settings.action import Action
     "-o",
     "--output",
     "target",
-    type=Output(),
+    type=OutputArgument(),
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
 @engine_option
 @click.option(
-    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib."
+    "--plot",
+    "picture",
+    type=OutputArgument(),
+    metavar="FILE.png|svg",
+    help="Draw setpoint, measurement and outputs; needs matplotlib.",
 )
 @vendors_option
 @json_option

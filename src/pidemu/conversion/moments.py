@@ -34,7 +34,7 @@ _POINTS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class MomentProblem:
     """What is wanted of a target.
 
     Attributes
@@ -59,11 +59,11 @@ class Problem:
         return Law(self.target.algorithm_of(self.numbers(moments)), self.scan)
 
 
-Way = Callable[[Problem, Sequence[float]], Sequence[float]]
+Way = Callable[[MomentProblem, Sequence[float]], Sequence[float]]
 """A way to solve: from the problem and the source's moments to moments to ask the closed form with."""
 
 
-def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
+def meet(problem: MomentProblem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
     """Return moments for which the target's law, sampled and held, has the moments of the source's.
 
     A scan rule and a hold change ``m1`` by ``h m0`` and ``m2`` by ``h m1``. What makes up for that is found by Newton's method; the
@@ -72,7 +72,7 @@ def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequen
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     terms : sequence of bool
         Which of integral, proportional and derivative term are at work. The moment of one that is not is neither met nor changed:
@@ -118,12 +118,12 @@ def sizes(moments: Sequence[float]) -> tuple[float, float, float]:
     )
 
 
-def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence[float]:
+def at_frequency(problem: MomentProblem, start: Sequence[float], w: float) -> Sequence[float]:
     """Return moments with the source's ``m0`` for which the two responses agree at a frequency.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     start : sequence of float
         The source's moments.
@@ -167,7 +167,7 @@ def check_optimiser() -> None:
         raise PidemuError("the match 'loop' needs scipy, which is not installed; pip install 'pidemu[loop]'")
 
 
-def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Sequence[float]:
+def in_loop(problem: MomentProblem, start: Sequence[float], process: Process) -> Sequence[float]:
     """Return moments with the source's ``m0`` for which the loop's response to a load step changes least.
 
     What is minimised is the integral of the squared difference of the two measurements after a load step, computed in the
@@ -175,7 +175,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     start : sequence of float
         The source's moments.

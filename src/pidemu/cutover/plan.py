@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pidemu.cutover.notes import notes
-from pidemu.cutover.steps import Step, steps
+from pidemu.cutover.steps import CutoverStep, steps
 from pidemu.cutover.takeover import Takeover, takeover_of
 from pidemu.cutover.trials import NO_BUMP, cut_over, resolution
 from pidemu.cutover.ways import best_way, simple_way
@@ -22,7 +22,7 @@ class TransferPlan:
 
     Attributes
     ----------
-    steps : tuple of Step
+    steps : tuple of CutoverStep
         What to do.
     bump : float
         What the output moves by in the first automatic scan where the plan is followed, by emulation [% of output span]. The
@@ -41,7 +41,7 @@ class TransferPlan:
         What the plan rests on, and what cannot be avoided and why.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[CutoverStep, ...]
     bump: float
     without_plan: float
     notes: tuple[str, ...]

@@ -28,7 +28,7 @@ _IN_CACHE: Final = 2**15
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BlockOutcome:
     """What came of a block of loops.
 
     Attributes
@@ -66,7 +66,7 @@ def run_block(
     width: int,
     room: Room | None,
     stop: Callable[[], bool],
-) -> Outcome:
+) -> BlockOutcome:
     """Run loops of a group side by side, until the last of them is done.
 
     Parameters
@@ -114,7 +114,7 @@ def run_block(
             columns[:, done] = states[places, done]
             done += 1
     found = dict(zip(COLUMNS, columns, strict=True))
-    return Outcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
+    return BlockOutcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
 
 
 def _spans(ends: Sequence[int], at_once: int) -> Iterator[tuple[int, int]]:

@@ -14,7 +14,7 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import Finished, finished
 from pidemu.fleet.folder import Place, SignalFolder
 from pidemu.fleet.parquet import ParquetFile
@@ -107,7 +107,7 @@ class SignalStore:
         """
         return np.empty(shape) if self._folder is None else self._folder.room(shape)
 
-    def stored(self, outcome: Outcome) -> Outcome:
+    def stored(self, outcome: BlockOutcome) -> BlockOutcome:
         """Write the records of a block, and return the outcome with them, or with the file, where they are kept.
 
         Raises

@@ -84,7 +84,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Responses:
+class StepResponses:
     """Outputs of the emulated controllers in the linear range.
 
     Attributes
@@ -154,7 +154,7 @@ def _held(law: Law, w: Floats) -> Response:
     return found
 
 
-def responses(c: Conversion) -> Responses | None:
+def responses(c: Conversion) -> StepResponses | None:
     """Return the outputs of both emulated controllers, and of the textbook settings where they are others.
 
     They run at the scan intervals of the certificate's emulation, from rest at 50 %, without output limits; the steps move the
@@ -167,7 +167,7 @@ def responses(c: Conversion) -> Responses | None:
 
     Returns
     -------
-    Responses or None
+    StepResponses or None
         ``None`` where the certificate holds no emulation.
     """
     if c.certificate.scan_by_scan is None:
@@ -187,7 +187,7 @@ def responses(c: Conversion) -> Responses | None:
             notes.append(f"the textbook settings are not shown: {error}")
     signals: tuple[Literal["setpoint", "measurement"], ...] = ("setpoint", "measurement")
     first, second = (tuple(_trace(c, one, (at, _AFTER * time), size, moves) for one in shown) for moves in signals)
-    return Responses(at, size, first, second, tuple(notes))
+    return StepResponses(at, size, first, second, tuple(notes))
 
 
 def _differ(a: Settings, b: Settings) -> bool:

@@ -11,7 +11,7 @@ from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, Quantity, number, shown
+from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, PlausibleSize, number, shown
 from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range
 from pidemu.settings.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import (
@@ -30,7 +30,7 @@ from pidemu.units import (
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
-_QUANTITIES: Final[dict[Role, Quantity]] = {
+_QUANTITIES: Final[dict[Role, PlausibleSize]] = {
     **dict.fromkeys((Role.GAIN, Role.MULTIPLIER, Role.PROCESS_GAIN), GAIN),
     **dict.fromkeys((Role.DERIVATIVE, Role.FILTER_TIME, Role.TRACKING_TIME), TIME),
     **dict.fromkeys((Role.PROCESS_TIME, Role.PROCESS_DELAY, Role.CLOSED_LOOP_TIME), TIME),
