@@ -8,11 +8,11 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from hypothesis import assume
 from hypothesis import strategies as st
 
 from pidemu.algorithm.model import Algorithm
+from pidemu.arrays import Floats as Floats  # noqa: PLC0414  # the tests take it from here
 from pidemu.backends.python import compiled
 from pidemu.card.document import parse
 from pidemu.card.library import load_card
@@ -24,8 +24,6 @@ from pidemu.errors import SettingError
 from pidemu.program.ir import Program
 from pidemu.settings.settings import Settings, limits, off_values
 from pidemu.units import Role, Spans, from_canonical, parse_unit
-
-Floats = npt.NDArray[np.float64]
 
 WIDE = (-1e12, 1e12)
 """Output limits that no test signal reaches."""

@@ -25,7 +25,7 @@ _LONGEST: Final = 40
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class PlausibleSize:
     """How large the values of a quantity can be, apart from 0.
 
     Attributes
@@ -53,17 +53,17 @@ class Quantity:
         return f"{words} is not {self.what}, {self.smallest:g} to {self.largest:g}{unit} in size; check the number and its unit"
 
 
-GAIN: Final = Quantity("a gain that a loop has", "%/%", 1e-30, 1e12)
-TIME: Final = Quantity("a time that a loop has", "s", 1e-30, 1e15)
-RATE: Final = Quantity("a reset rate that a loop has", "1/s", 1e-30, 1e20)
-LEVEL: Final = Quantity("a signal or a rate that a loop has", "%", 0.0, 1e40)
-RATIO: Final = Quantity("a ratio that a filter has", "", 1e-15, 1e15)
-WEIGHT: Final = Quantity("a weight that a controller has", "", 0.0, 1e15)
-ENDS: Final = Quantity("the end of a signal's range", "", 0.0, 1e15)
-SPAN: Final = Quantity("the width of a signal's range", "", 1e-12, 1e15)
-INTERVAL: Final = Quantity("an interval at which a controller is executed", "s", 1e-9, 1e9)
-PROCESS_TIME: Final = Quantity("a time that a process has", "s", 1e-9, 1e9)
-ROOT: Final = Quantity("a pole or zero of a process", "rad/s", 1e-9, 1e9)
+GAIN: Final = PlausibleSize("a gain that a loop has", "%/%", 1e-30, 1e12)
+TIME: Final = PlausibleSize("a time that a loop has", "s", 1e-30, 1e15)
+RATE: Final = PlausibleSize("a reset rate that a loop has", "1/s", 1e-30, 1e20)
+LEVEL: Final = PlausibleSize("a signal or a rate that a loop has", "%", 0.0, 1e40)
+RATIO: Final = PlausibleSize("a ratio that a filter has", "", 1e-15, 1e15)
+WEIGHT: Final = PlausibleSize("a weight that a controller has", "", 0.0, 1e15)
+ENDS: Final = PlausibleSize("the end of a signal's range", "", 0.0, 1e15)
+SPAN: Final = PlausibleSize("the width of a signal's range", "", 1e-12, 1e15)
+INTERVAL: Final = PlausibleSize("an interval at which a controller is executed", "s", 1e-9, 1e9)
+PROCESS_TIME: Final = PlausibleSize("a time that a process has", "s", 1e-9, 1e9)
+ROOT: Final = PlausibleSize("a pole or zero of a process", "rad/s", 1e-9, 1e9)
 POLES: Final = 20
 """Poles that a process can have; a chain of more is a dead time."""
 INTEGRATORS: Final = 4
@@ -136,7 +136,7 @@ def plain_number(text: str, *, words: bool = False) -> float:
     raise ValueError(f"'{quoted(text)}' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3")
 
 
-def plausible(name: str, given: Any, quantity: Quantity, error: type[PidemuError]) -> float:
+def plausible(name: str, given: Any, quantity: PlausibleSize, error: type[PidemuError]) -> float:
     """Return a number that a quantity can have.
 
     Parameters
@@ -145,7 +145,7 @@ def plausible(name: str, given: Any, quantity: Quantity, error: type[PidemuError
         What it is called where it was given.
     given : object
         What was given.
-    quantity : Quantity
+    quantity : PlausibleSize
         What it must be.
     error : type
         What is raised where it is not.

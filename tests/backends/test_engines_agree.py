@@ -6,10 +6,10 @@ import zlib
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.backends import native
 from pidemu.backends.choice import ENGINES, Engine, block, has_numba
 from pidemu.backends.python import compiled, starting
@@ -18,7 +18,6 @@ from pidemu.checks.runs import plausible
 from pidemu.settings.ranges import PERCENT
 from pidemu.settings.settings import Settings
 
-Floats = npt.NDArray[np.float64]
 CARDS = [pytest.param(card_id, id=card_id) for card_id in card_files()]
 COMPILER = pytest.mark.skipif(not native.available(), reason="no C compiler on this machine")
 NUMBA = pytest.mark.skipif(not has_numba(), reason="there is no Numba for this machine")

@@ -12,7 +12,7 @@ import pidemu
 from pidemu.certificate.arithmetic import smallest_error
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
-from pidemu.certificate.scaled_controller import sides
+from pidemu.certificate.scaled_controller import scaled_controllers
 from pidemu.settings.settings import Settings
 from tests.checks.bench import VALID, edited, written
 
@@ -28,7 +28,7 @@ def differences(source: Settings, target: Settings, scan: float = 1.0) -> dict[s
 
 
 def least(s: Settings, h: float) -> float:
-    return smallest_error(sides(s, s, (h, h))[0])
+    return smallest_error(scaled_controllers(s, s, (h, h))[0])
 
 
 def seen(error: float) -> float:

@@ -16,9 +16,9 @@ from pidemu.certificate import limit_test as windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
 from pidemu.certificate.recovery import Recoveries, Recovery
-from pidemu.certificate.scaled_controller import sides
-from pidemu.certificate.trials import Bench, Plan
-from pidemu.records.sampling import limits_for
+from pidemu.certificate.scaled_controller import scaled_controllers
+from pidemu.certificate.trials import TrialPlan, TriedController
+from pidemu.controller.bench import limits_in_percent
 from pidemu.records.standard import scale_of, standard_record
 from pidemu.settings.settings import Settings
 from tests.algorithms import NONE
@@ -133,7 +133,7 @@ def test_noise_and_derivative_at_a_limit_show_what_steps_do_not() -> None:
     assert outputs[1][worst] - outputs[0][worst] > 30
     pair = Recovery(100, True, 0.0, 50.0), Recovery(100, True, 0.0, 50.0)
     alike = Recoveries(pair, short=False, late=False, apart=False, noisy=(1.25, 40.5), noisy_at=57.0)
-    assert windup.story(alike, Plan(60.0, 4.0, (0.0, 100.0)), sides(source, target, (1.0, 1.0))) == (
+    assert windup.story(alike, TrialPlan(60.0, 4.0, (0.0, 100.0)), scaled_controllers(source, target, (1.0, 1.0))) == (
         "Coming back from 0 % along a ramp of PV with noise of 0.5 %, 57 s after PV has turned, the output is 1.25 % on the old "
         "controller and 40.5 % on the new one; without noise they are alike."
     )
@@ -159,7 +159,7 @@ def test_times_and_outputs_are_those_of_an_emulation(source: str, target: str) -
     pair = dict(SOURCES)[source], dict(SOURCES)[target]
     found = differences(*pair, time=90.0)["windup"]
     for s, stays, at_zero in zip(pair, found.figures[STAYS], found.figures[AT_ZERO], strict=True):
-        low, high = limits_for(pair[0], None, (0.0, 100.0))
+        low, high = limits_in_percent(pair[0], None)
         ramp = slow(pair, 90.0)
         output, turn, end = excursion(s, 90.0, 4.0, 1.0, (low, high), ramp)
         reached = output[turn - 1]
@@ -323,14 +323,14 @@ def test_every_pair_of_cards_has_its_differences_in_words_and_numbers(monkeypatc
     def once(of: Callable[..., object]) -> Callable[..., object]:
         """Emulate every card once with the same limits, not once in every pair."""
 
-        def call(bench: Bench, *arguments: object, **named: object) -> object:
-            key = (of.__name__, bench.key, arguments, tuple(named.items()))
-            return seen[key] if key in seen else seen.setdefault(key, of(bench, *arguments, **named))
+        def call(tried: TriedController, *arguments: object, **named: object) -> object:
+            key = (of.__name__, tried.key, arguments, tuple(named.items()))
+            return seen[key] if key in seen else seen.setdefault(key, of(tried, *arguments, **named))
 
         return call
 
-    monkeypatch.setattr(Bench, "course", once(Bench.course))
-    monkeypatch.setattr(Bench, "transfers", once(Bench.transfers))
+    monkeypatch.setattr(TriedController, "course", once(TriedController.course))
+    monkeypatch.setattr(TriedController, "transfers", once(TriedController.transfers))
     for (a, source), (b, target) in itertools.permutations(SOURCES, 2):
         found = nonlinear_differences(source, target, (1.0, 1.0), (90.0, 4.0))
         aspects = [d.aspect for d in found]

@@ -613,6 +613,7 @@ def test_numbers_that_cannot_be_computed_with_together_are_refused_where_they_st
         raise ZeroDivisionError("float division by zero")
 
     card = loaded(tmp_path, VALID.replace("    canonical: {kp: 2, ki: 0.0333333, kd: 32, Tf: 2}", "    outputs: [1]"))
+    monkeypatch.setattr(runs, "Bench", divided)
     monkeypatch.setattr(runs, "Controller", divided)
     message = "these numbers do not go together: they cannot be computed with"
     assert headlines(list(runs.reject_wrong_examples(card))) == [f"45:5: {message}"]

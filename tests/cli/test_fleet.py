@@ -15,7 +15,7 @@ import pytest
 
 import pidemu
 from pidemu.analysis.figures import loop_figures
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.result import FleetResult
 from tests.cli.helpers import said, strict_json, told
@@ -216,7 +216,7 @@ def test_progress_is_shown_on_request() -> None:
 def test_an_interrupted_fleet_gives_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     add = FleetResult.add
 
-    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+    def interrupted(self: FleetResult, found: BlockOutcome | Failed) -> int:
         if "done" in self.status:
             raise KeyboardInterrupt
         return add(self, found)
@@ -274,7 +274,7 @@ def test_a_folder_that_holds_signals_already_is_refused() -> None:
 def test_a_run_that_did_not_end_is_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
     add = FleetResult.add
 
-    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+    def interrupted(self: FleetResult, found: BlockOutcome | Failed) -> int:
         if "done" in self.status:
             raise KeyboardInterrupt
         return add(self, found)
@@ -345,9 +345,9 @@ def test_one_long_cell_does_not_widen_the_table_on_the_screen(folder: Path) -> N
 def interrupt_after(blocks: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupt the next fleet where so many blocks, or loops that failed, are done."""
     add = FleetResult.add
-    seen: list[Outcome | Failed] = []
+    seen: list[BlockOutcome | Failed] = []
 
-    def interrupted(self: FleetResult, found: Outcome | Failed) -> int:
+    def interrupted(self: FleetResult, found: BlockOutcome | Failed) -> int:
         if len(seen) == blocks:
             raise KeyboardInterrupt
         seen.append(found)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from hypothesis import assume
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.arrays import Complexes
+from pidemu.arrays import Floats as Floats  # noqa: PLC0414  # the tests take it from here
 from pidemu.card.load import Card
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
@@ -16,8 +17,7 @@ from pidemu.settings.settings import Settings, limits
 from pidemu.units import Role
 from tests.helpers import WIDE, settings_of
 
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+Complex = Complexes
 
 
 def random_signal(seed: int, scans: int = 200, rest: int = 3) -> Floats:

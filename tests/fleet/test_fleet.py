@@ -25,7 +25,7 @@ from pidemu.backends.choice import Engine, block
 from pidemu.fleet import blocks, local, prepare
 from pidemu.fleet.blocks import COLUMNS
 from pidemu.fleet.judgement import RAN
-from pidemu.fleet.loops import Plan
+from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import HEADER
 from pidemu.program.ir import Structure
@@ -100,7 +100,7 @@ def test_the_error_counts_from_the_scan_of_the_load_step_on_or_from_the_first() 
 
 def test_loops_of_unlike_length_share_a_block_up_to_twice_the_scans() -> None:
     loops = [replace(loop, time=float(seconds)) for loop, seconds in zip(alike(6), (90, 10, 20, 21, 11, 50), strict=True)]
-    ready = [one for one in prepare.prepared(enumerate(loops), Plan(), {}) if isinstance(one, prepare.Prepared)]
+    ready = [one for one in prepare.prepared(enumerate(loops), FleetPlan(), {}) if isinstance(one, prepare.Prepared)]
     (group,) = prepare.grouped(ready)
 
     def times(width: int, longer: int) -> list[list[int | None]]:
@@ -342,14 +342,14 @@ def test_a_loop_that_fails_in_running_costs_itself_only(error: Exception, monkey
 
 @pytest.mark.parametrize("error", [RecursionError("too deep"), MemoryError("no room"), KeyError("kp"), SyntaxError("a113")])
 def test_a_loop_that_fails_in_preparing_costs_itself_only(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = Plan.trial
+    real = FleetPlan.trial
 
-    def trial(self: Plan, loop: Loop) -> Any:
+    def trial(self: FleetPlan, loop: Loop) -> Any:
         if loop.tag == "L7":
             raise error
         return real(self, loop)
 
-    monkeypatch.setattr(Plan, "trial", trial)
+    monkeypatch.setattr(FleetPlan, "trial", trial)
     result = Fleet(alike(20)).simulate(**STEPS)
     assert result.counts == {"done": 19, "failed": 1}
     assert f"internal error of this loop ({type(error).__name__}: {error})" in result.failures["L7"]
@@ -362,7 +362,7 @@ def test_what_is_in_memory_does_not_grow_with_blocks_that_nobody_has_taken(monke
         made.append(1)
         return np.empty(shape)
 
-    found = local.outcomes(enumerate(alike(640, time=20.0)), Plan(keep=True, engine="python"), cores=2, room=room)
+    found = local.outcomes(enumerate(alike(640, time=20.0)), FleetPlan(keep=True, engine="python"), cores=2, room=room)
     taken = 0
     for _ in found:
         taken += 1
@@ -372,7 +372,7 @@ def test_what_is_in_memory_does_not_grow_with_blocks_that_nobody_has_taken(monke
 
 
 def test_blocks_that_wait_until_others_are_taken_stop_too() -> None:
-    found = local.outcomes(enumerate(alike(1280, time=5.0)), Plan(keep=True, engine="python"), cores=2, room=np.empty)
+    found = local.outcomes(enumerate(alike(1280, time=5.0)), FleetPlan(keep=True, engine="python"), cores=2, room=np.empty)
     next(found)
     time.sleep(0.5)  # all that may be ahead is done, and the threads wait
     closing = threading.Thread(target=found.close, daemon=True)

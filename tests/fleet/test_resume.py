@@ -20,7 +20,7 @@ from pidemu.backends.cache import warn
 from pidemu.fleet import finished, local
 from pidemu.fleet.finished import keys
 from pidemu.fleet.folder import INDEX
-from pidemu.fleet.loops import Plan
+from pidemu.fleet.loops import FleetPlan
 from tests.fleet.killing import parquet_of, signals_of
 from tests.fleet.support import alike
 
@@ -305,7 +305,7 @@ def test_the_key_of_a_loop_depends_on_all_that_its_numbers_do_and_on_nothing_els
     (tmp_path / "generic").mkdir()
     source = (Path(pidemu.__file__).parents[2] / "vendors" / "generic" / "standard.yaml").read_text(encoding="utf-8")
     (tmp_path / "generic" / "standard.yaml").write_text(source.replace("limits: [0, 100]", "limits: [0, 95]"), encoding="utf-8")
-    loop, plan = alike(1)[0], Plan()
+    loop, plan = alike(1)[0], FleetPlan()
     others = [
         replace(loop, settings=pidemu.load_card("generic/standard").settings(K=0.51, Ti=8.0, Td=0.4, Tf=0.2)),
         replace(loop, settings=pidemu.load_card("generic/standard", [tmp_path]).settings(K=0.5, Ti=8.0, Td=0.4, Tf=0.2)),
@@ -327,6 +327,6 @@ def test_the_key_of_a_loop_depends_on_all_that_its_numbers_do_and_on_nothing_els
 
 
 def test_keys_are_those_of_another_process() -> None:
-    code = "from tests.fleet.test_resume import *; print(*keys(alike(3), Plan()))"
+    code = "from tests.fleet.test_resume import *; print(*keys(alike(3), FleetPlan()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
-    assert done.stdout.split() == keys(alike(3), Plan())
+    assert done.stdout.split() == keys(alike(3), FleetPlan())

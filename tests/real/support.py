@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pidemu.arrays import Floats as Floats  # noqa: PLC0414  # the tests take it from here
 
 DATA = Path(__file__).parents[1] / "data"
 

@@ -11,9 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.errors import RecordError, ScanError
-from pidemu.records.files import Floats, Record
-from pidemu.records.sampling import Scale, sampled
+from pidemu.matrix.typical import typical_settings
+from pidemu.records.files import Record
+from pidemu.records.sampling import record_from_percent, record_in_percent, sampled
 from pidemu.records.standard import StandardRecord, standard_record
 from pidemu.settings.settings import Settings
 from tests.helpers import dials_of
@@ -252,14 +254,14 @@ def test_a_record_file_is_in_the_units_of_the_first_controller() -> None:
 
 
 def test_scaling_there_and_back_changes_nothing_but_rounding() -> None:
-    scale = Scale(pidemu.load_card("arduino/pid").settings(Kp=1, Ki=0, pv_range=(-50, 150), op_range=(4, 20)))
+    ranges = pidemu.load_card("arduino/pid").settings(Kp=1, Ki=0, pv_range=(-50, 150), op_range=(4, 20)).own_ranges
     record = Record(of(-50, 150), of(0, 50), manual=of(4, 20), cascade=of(50, NAN))
-    percent = scale.percent(record)
+    percent = record_in_percent(record, ranges)
     assert (percent.sp.tolist(), percent.pv.tolist()) == ([0, 100], [25, 50])
     assert percent.manual is not None
     assert percent.cascade is not None
     assert (percent.manual.tolist(), percent.cascade[0]) == ([0, 100], 50)
-    back = scale.own(percent)
+    back = record_from_percent(percent, ranges)
     for name in ("sp", "pv", "manual", "cascade"):
         np.testing.assert_allclose(getattr(back, name), getattr(record, name), rtol=1e-15)
 
@@ -269,6 +271,13 @@ def test_a_controller_without_integral_has_the_initial_output_for_its_bias() -> 
     assert found.outputs["generic/standard"][0] == 50
     assert found.differences[0].largest == 0
     assert "generic/standard: without integral action its output at zero error is a bias, 50 %" in found.notes
+
+
+@pytest.mark.parametrize("card", ["simple-pid/simple-pid", "oscat/ft-pidwl"])
+def test_limits_that_a_card_does_not_have_are_said_to_be_taken(card: str) -> None:
+    """The one writes infinity for them, the other the largest number that it can."""
+    found = pidemu.compare([pi(), typical_settings(pidemu.load_card(card))], scan=1.0)
+    assert f"{card}: the card has no output limits of its own; it has 0 to 100 % here" in found.notes
 
 
 def test_direct_action_mirrors_the_outputs() -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.controller.signals import Event
 from pidemu.errors import RecordError, ScanError
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import Playback, Saturation, even_step, modes, play, spells, timing
 
 NAN = math.nan

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import play
 from pidemu.report.plots import check_picture, plot_comparison, plot_run
 from tests.cli.helpers import Said, said

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import math
+import re
+import struct
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
+import pidemu
 from pidemu.errors import SettingError
 from pidemu.settings.quantities import measure_of
 from pidemu.settings.range_relation import RangeQuestion, Relation, relation
-from pidemu.settings.ranges import RANGES, SignalRange, Which, read_range
+from pidemu.settings.ranges import (
+    NO_LIMIT,
+    PERCENT,
+    RANGES,
+    UNLIMITED,
+    SignalRange,
+    Which,
+    are_limits,
+    infinite_where_none,
+    is_limit,
+    read_range,
+)
 
 OVEN = SignalRange(0.0, 400.0, "degC")
 
@@ -183,3 +202,59 @@ def test_the_source_s_range_is_asked_for_where_only_the_target_s_is_given() -> N
     found = relation(None, OVEN, "pv_range")
     assert isinstance(found, RangeQuestion)
     assert (found.kind, found.about, found.example) == ("range", "pv_range", '--pv-range "0,400 degC"')
+
+
+VALVE = SignalRange(4.0, 20.0, "mA")
+
+
+def test_a_level_counts_from_the_low_end_and_a_change_from_nothing() -> None:
+    assert (VALVE.from_percent(25.0), VALVE.in_percent(8.0)) == (8.0, 25.0)
+    assert (VALVE.change_from_percent(25.0), VALVE.change_in_percent(4.0)) == (4.0, 25.0)
+
+
+def test_arrays_are_scaled_as_numbers_are() -> None:
+    levels = np.array([4.0, 12.0, 20.0])
+    assert VALVE.in_percent(levels).tolist() == [0.0, 50.0, 100.0]
+    assert VALVE.from_percent(VALVE.in_percent(levels)).tolist() == levels.tolist()
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.floats(-200, 200))
+def test_percent_there_and_back_is_the_same_but_for_rounding(low: float, span: float, x: float) -> None:
+    own = SignalRange(low, low + span)
+    assume(own.low < own.high)
+    size = 100 * max(abs(own.low), abs(own.high)) / own.span
+    assert own.in_percent(own.from_percent(x)) == pytest.approx(x, abs=1e-14 * max(size, abs(x)))
+    assert own.change_in_percent(own.change_from_percent(x)) == pytest.approx(x, rel=1e-14)
+
+
+def test_a_signal_in_percent_already_keeps_its_bits() -> None:
+    for x in (-0.0, 0.1, 1e300, math.inf):
+        assert [struct.pack("d", x)] * 2 == [struct.pack("d", f(x)) for f in (PERCENT.from_percent, PERCENT.in_percent)]
+
+
+@pytest.mark.parametrize("x", [NO_LIMIT, 3.4e38, 1e38, math.inf])
+def test_the_largest_float32_is_no_limit_and_neither_is_infinity(x: float) -> None:
+    assert (is_limit(x), is_limit(-x), are_limits((0.0, x))) == (False, False, False)
+    assert infinite_where_none((-x, 100.0)) == (-math.inf, 100.0)
+
+
+def test_what_is_no_limit_is_none_in_any_unit() -> None:
+    wide = SignalRange(0.0, 1e12)
+    for limits in (UNLIMITED, (-math.inf, math.inf), (-1e38, 1e38)):
+        assert wide.limits_in_percent(limits) == limits
+        assert wide.limits_from_percent(limits) == limits
+    assert VALVE.limits_in_percent((4.0, math.inf)) == (0.0, math.inf)
+    assert VALVE.limits_from_percent((0, 75)) == (4.0, 16.0)
+
+
+def test_no_other_module_has_a_number_of_its_own_for_no_limit() -> None:
+    """Neither a pair such as (-1e12, 1e12) nor a name that says so."""
+    source = Path(pidemu.__file__).parent
+    found = [
+        f"{path.relative_to(source)}: {line.strip()}"
+        for path in source.rglob("*.py")
+        if path != source / "settings" / "ranges.py"
+        for line in path.read_text("utf-8").splitlines()
+        if re.search(r"\(-(1e\d+), \1\)|^_?(NO_LIMIT|UNLIMITED|WIDE|FREE)\b.*=", line)
+    ]
+    assert found == []

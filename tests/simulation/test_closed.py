@@ -10,12 +10,12 @@ from typing import Any
 
 import control
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.backends.python import compiled, starting
 from pidemu.card.library import card_files
 from pidemu.card.load import variants
@@ -33,7 +33,6 @@ from pidemu.simulation.simulate import simulate
 from pidemu.simulation.trial import Trial, trial
 from tests.helpers import scans_of, settings_of
 
-Floats = npt.NDArray[np.float64]
 CARDS = list(card_files())
 H = 0.5
 SMALLEST_NORMAL = float(np.finfo(float).tiny)

@@ -7,19 +7,17 @@ from collections.abc import Callable
 
 import control
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process, parse_process
 from tests.simulation.processes import processes
-
-Floats = npt.NDArray[np.float64]
 
 
 @given(process=processes(), delay=st.just(0.0) | st.floats(0.1, 20))

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.signal
 from hypothesis import assume, given
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.analysis.figures import crossover, loop_figures, scan_for
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine
 from pidemu.certificate.figures import loop_rows
 from pidemu.errors import ProcessError, UndefinedError
@@ -25,7 +25,6 @@ from pidemu.simulation.simulate import Simulation, compare_loops, run_trial, sim
 from pidemu.simulation.trial import trial
 from tests.fleet.support import EVERY_ENGINE
 
-Floats = npt.NDArray[np.float64]
 WIDE = (-1e9, 1e9)
 ANY = Choice("python", "any")
 FOPDT = Process.from_lags(1, [10], delay=2)

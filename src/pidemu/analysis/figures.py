@@ -15,14 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.analysis.loop_figures import LoopFigures
-from pidemu.analysis.open_loop import PER_DECADE, OpenLoop, Picture, picture_of
+from pidemu.analysis.open_loop import PER_DECADE, OpenLoop, OpenLoopResponse, picture_of
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process
 from pidemu.settings.settings import Settings
-
-Floats = npt.NDArray[np.float64]
 
 SCANS_PER_TIME: Final = 20
 """By default, at least this many scans in the time in which the loop moves."""
@@ -179,14 +178,14 @@ def _interpolated(x1: Floats, x2: Floats, x3: Floats, f1: Floats, f2: Floats, f3
     return np.where(safe, found, 0.5)
 
 
-def _crossovers(loop: OpenLoop, picture: Picture) -> Floats:
+def _crossovers(loop: OpenLoop, picture: OpenLoopResponse) -> Floats:
     """Return where the loop gain is 1 [rad/s]."""
     w, sizes = picture.all_sizes
     with np.errstate(divide="ignore"):  # nothing comes through a process with a zero at 0, as far down as floating point goes
         return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
 
 
-def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
+def _gain_margin(loop: OpenLoop, picture: OpenLoopResponse) -> float:
     """Return the factor nearest to 1 by which the loop gain may change; infinite where there is none.
 
     The open loop also is a real number where the frequencies end: at the Nyquist frequency of a sampled loop, and at zero frequency
@@ -204,7 +203,7 @@ def _gain_margin(loop: OpenLoop, picture: Picture) -> float:
     return float(factors[np.argmin(np.abs(np.log(factors)))]) if factors.size else math.inf
 
 
-def _largest(loop: OpenLoop, picture: Picture, of: Callable[[Response], Floats]) -> float:
+def _largest(loop: OpenLoop, picture: OpenLoopResponse, of: Callable[[Response], Floats]) -> float:
     """Return the largest value of a function of the open loop: the highest peaks, each looked at more and more finely."""
     with np.errstate(divide="ignore", invalid="ignore"):  # on the edge of stability
         return _highest_peak(loop, picture.w, of(picture.values), of)

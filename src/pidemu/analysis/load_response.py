@@ -19,10 +19,9 @@ from pidemu.law.law import Law
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
 from pidemu.program.builder import build
-from pidemu.program.ir import StateRole
+from pidemu.settings.ranges import UNLIMITED
 from pidemu.settings.settings import Settings
 
-_WIDE: Final = (-1e12, 1e12)
 _SMALL: Final = 1e-6
 """Size of the load step that is simulated [%]: far from whatever depends on size."""
 _SETTLED: Final = 1e-7
@@ -175,8 +174,8 @@ def _tail(before: float, after: float) -> float:
 def _shares(algorithm: Algorithm, h: float, process: Process, scans: int) -> Iterator[float]:
     """Yield the integral of the absolute error per block of scans, after a load step of 1 % from rest [% s]."""
     linear = algorithm.linear
-    running = Running(lambda _h: linear, lambda a, h: build(a, h, limits=_WIDE), h)
-    running.take_over({StateRole.OUTPUT: 0.0}, {"sp": 0.0, "pv": 0.0, "auto": 1.0, "manual": nan})
+    running = Running(lambda _h: linear, lambda a, h: build(a, h, limits=UNLIMITED), h)
+    running.rest(0.0, 0.0, 0.0)
     scan, state, plant = running.compiled.scan, running.state, Plant(process.sampled(h))
     last = 0.0
     while True:

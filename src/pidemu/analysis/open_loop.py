@@ -13,11 +13,10 @@ import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.analysis.stability import unstable_continuous, unstable_sampled
+from pidemu.arrays import Floats
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process
-
-Floats = npt.NDArray[np.float64]
 
 PER_DECADE: Final = 60
 _TURN: Final = 0.2
@@ -31,7 +30,7 @@ _DAMPING: Final = 1e-6
 
 
 @dataclass(frozen=True)
-class Picture:
+class OpenLoopResponse:
     """The open loop at frequencies between which nothing happens unseen.
 
     Attributes
@@ -101,12 +100,12 @@ class OpenLoop:
         a = self.law.algorithm
         return self.process.integrators + int(bool(a.ki) or a.dahlin is not None)
 
-    def unstable(self, picture: Picture, crossovers: Floats) -> bool:
+    def unstable(self, picture: OpenLoopResponse, crossovers: Floats) -> bool:
         """Tell whether the closed loop is unstable, or on the edge of it.
 
         Parameters
         ----------
-        picture : Picture
+        picture : OpenLoopResponse
             The open loop.
         crossovers : ndarray, shape (m,)
             Where its gain is 1 [rad/s].
@@ -166,7 +165,7 @@ def _ends(loop: OpenLoop) -> tuple[float, float]:
     return low, high
 
 
-def picture_of(loop: OpenLoop) -> Picture:
+def picture_of(loop: OpenLoop) -> OpenLoopResponse:
     """Return the open loop at enough frequencies."""
     low, high = _ends(loop)
     w = np.geomspace(low, high, math.ceil(PER_DECADE * math.log10(high / low)))
@@ -188,4 +187,4 @@ def picture_of(loop: OpenLoop) -> Picture:
             break
         between = np.sqrt(w[rough] * w[rough + 1])
         w, values = np.insert(w, rough + 1, between), np.insert(values, rough + 1, loop(between))
-    return Picture(w, values, beyond, loop(beyond))
+    return OpenLoopResponse(w, values, beyond, loop(beyond))

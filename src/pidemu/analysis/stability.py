@@ -6,11 +6,9 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Complexes, Floats
 from pidemu.law.rational import Response
-
-Floats = npt.NDArray[np.float64]
 
 _EDGE: Final = 1e-12
 """A root nearer to the edge of stability, relative to its size, is on it."""
@@ -51,7 +49,7 @@ def unstable_continuous(num: Floats, den: Floats, delay: float, crossovers: Floa
     return count > 0
 
 
-def _roots(ascending: Floats) -> npt.NDArray[np.complex128]:
+def _roots(ascending: Floats) -> Complexes:
     """Return the roots of a polynomial, computed in a unit of frequency that suits it."""
     some = np.flatnonzero(ascending)
     if some.size < 2:

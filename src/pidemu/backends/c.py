@@ -13,7 +13,7 @@ from typing import Final
 
 from pidemu.backends.c_expressions import RESERVED
 from pidemu.backends.c_header import MEMBER, prototypes, run_head, step_head, types
-from pidemu.backends.c_unit import Unit, function, said, scan
+from pidemu.backends.c_unit import CUnit, function, said, scan
 from pidemu.backends.comments import comment_text
 from pidemu.errors import EngineError
 from pidemu.program.ir import Binary, Cast, Expr, Floor, Program, Select
@@ -119,7 +119,7 @@ def library(program: Program, name: str) -> str:
     program, name
         As in `header`.
     """
-    unit = Unit.of(program, name, own_lines=False)
+    unit = CUnit.of(program, name, own_lines=False)
     general = [scan(unit, unit.program, "scan"), _run(unit, unit.program, "run", "scan")]
     return _joined(["#include <stddef.h>", *_preamble(unit), types(unit), *general, *_automatic(unit)])
 
@@ -138,16 +138,16 @@ def check_name(name: str) -> None:
         raise EngineError(f"'{name}' is a word of C or C++; give another name, such as {name}_control")
 
 
-def _unit(program: Program, name: str) -> Unit:
+def _unit(program: Program, name: str) -> CUnit:
     check_name(name)
-    return Unit.of(program, name)
+    return CUnit.of(program, name)
 
 
 def _joined(parts: list[str]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _about(unit: Unit, notes: Sequence[str]) -> str:
+def _about(unit: CUnit, notes: Sequence[str]) -> str:
     """Return the comment at the top: which controller, and how to build it."""
     absent = ", ".join(unit.names[q.name] for q in unit.program.inputs if q.name in _ABSENT)
     title = textwrap.wrap(comment_text(unit.program.title), 116, break_long_words=False)
@@ -156,7 +156,7 @@ def _about(unit: Unit, notes: Sequence[str]) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in text.splitlines()), " */"])
 
 
-def _preamble(unit: Unit) -> list[str]:
+def _preamble(unit: CUnit) -> list[str]:
     parts = ["#include <float.h>\n#include <math.h>", _guards(unit.program), _INLINE.format(name=unit.name.upper())]
     floats = {unit.writer.is_float(x) for assign in explicit(unit.program) for x in _floors(assign.value)}
     for suffix, kind in (("", "double"), ("f", "float")):
@@ -187,18 +187,18 @@ def _floors(x: Expr) -> Iterator[Expr]:
             yield from _floors(right)
 
 
-def _functions(unit: Unit) -> list[str]:
+def _functions(unit: CUnit) -> list[str]:
     general = [scan(unit, unit.program, "scan"), _step(unit), _run(unit, unit.program, "run", "scan")]
     return [_default(unit), _init(unit), *general, *_automatic(unit)]
 
 
-def _default(unit: Unit) -> str:
+def _default(unit: CUnit) -> str:
     coefficients = zip(unit.program.coefficients, unit.program.values, strict=True)
     values = [said(f"    {unit.number(q.name, x)},", unit.names[q.name], MEMBER) for q, x in coefficients]
     return "\n".join([f"const {unit.name}_settings {unit.name}_default = {{", *(values or ["    0.0"]), "};"])
 
 
-def _init(unit: Unit) -> str:
+def _init(unit: CUnit) -> str:
     program = unit.program
     starting = zip(program.states, program.initial, strict=True)
     body = ["    size_t i;"] if program.lines else []
@@ -210,18 +210,18 @@ def _init(unit: Unit) -> str:
     return function(f"void {unit.name}_init({unit.name}_state *state)", body or ["    (void)state;"])
 
 
-def _step(unit: Unit) -> str:
+def _step(unit: CUnit) -> str:
     arguments = ["settings", "state", *unit.arguments(unit.program, "{1}"), *(f"{unit.names[n]}_out" for n in unit.program.also)]
     return function(step_head(unit), [f"    return {unit.name}_scan({', '.join(arguments)});"])
 
 
-def _automatic(unit: Unit) -> list[str]:
+def _automatic(unit: CUnit) -> list[str]:
     if unit.automatic is None:
         return []
     return [scan(unit, unit.automatic, "scan_automatic"), _run(unit, unit.automatic, "run_automatic", "scan_automatic")]
 
 
-def _run(unit: Unit, program: Program, name: str, each: str) -> str:
+def _run(unit: CUnit, program: Program, name: str, each: str) -> str:
     samples = unit.arguments(program, "{1}[i]")
     arguments = ["&fixed", "&now", *samples, *(f"&{unit.names[n]}_out[i]" for n in program.also)]
     body = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from pidemu.backends.c_unit import Unit, said, signature
+from pidemu.backends.c_unit import CUnit, said, signature
 from pidemu.backends.comments import comment_text
 from pidemu.program.ir import Line, Program, Quantity
 
@@ -12,7 +12,7 @@ MEMBER: Final = 36
 """Column of the comments beside members."""
 
 
-def types(unit: Unit) -> str:
+def types(unit: CUnit) -> str:
     """Return the types of settings and state."""
     program = unit.program
     lengths = [f"#define {unit.length(x)} {n}u" for x, n in zip(program.lines, program.lengths, strict=True)]
@@ -31,11 +31,11 @@ def types(unit: Unit) -> str:
     )
 
 
-def _member(unit: Unit, q: Quantity) -> str:
+def _member(unit: CUnit, q: Quantity) -> str:
     return said(f"    {unit.type(q.name)} {unit.names[q.name]};", _with_unit(q), MEMBER)
 
 
-def _line_members(unit: Unit, line: Line) -> list[str]:
+def _line_members(unit: CUnit, line: Line) -> list[str]:
     kind, name = unit.type(line.source), unit.line(line)
     if unit.own_lines:
         return [said(f"    {kind} {name}[{unit.length(line)}];", _with_unit(line), MEMBER), f"    size_t {name}_at;"]
@@ -46,7 +46,7 @@ def _with_unit(q: Quantity | Line) -> str:
     return f"{q.text} [{q.unit}]" if q.text else ""
 
 
-def prototypes(unit: Unit) -> str:
+def prototypes(unit: CUnit) -> str:
     """Return what the header declares, with what it means."""
     meant = [f" *   {unit.names[q.name]:<12}{comment_text(_with_unit(q))}" for q in unit.program.inputs]
     shorter = "/* The same with fewer inputs and decisions: for scans after one in automatic, while automatic lasts. */"
@@ -68,13 +68,13 @@ def prototypes(unit: Unit) -> str:
     )
 
 
-def step_head(unit: Unit) -> str:
+def step_head(unit: CUnit) -> str:
     """Return the head of the function for one scan."""
     result = f"{unit.type(unit.program.output)} {unit.name}_step"
     return signature(result, [*unit.pointers, *unit.arguments(unit.program, "{} {}"), *unit.also])
 
 
-def run_head(unit: Unit, program: Program, name: str) -> str:
+def run_head(unit: CUnit, program: Program, name: str) -> str:
     """Return the head of a function for many scans of the program, or of that for automatic scans."""
     output = f"{unit.type(program.output)} *{unit.names[program.output]}"
     samples = unit.arguments(program, "const {} *{}")

@@ -17,7 +17,7 @@ _WIDTH: Final = 120
 
 
 @dataclass(frozen=True)
-class Unit:
+class CUnit:
     """A program under a name.
 
     Attributes
@@ -41,7 +41,7 @@ class Unit:
     own_lines: bool
 
     @classmethod
-    def of(cls, program: Program, name: str, *, own_lines: bool = True) -> Unit:
+    def of(cls, program: Program, name: str, *, own_lines: bool = True) -> CUnit:
         """Return the unit of a program."""
         modes = any(q.name == "auto" for q in program.inputs)
         return cls(program, specialise(program) if modes else None, name, identifiers(program), own_lines)
@@ -114,12 +114,12 @@ def function(head: str, body: Iterable[str]) -> str:
     return "\n".join([head, "{", *body, "}"])
 
 
-def scan(unit: Unit, program: Program, name: str) -> str:
+def scan(unit: CUnit, program: Program, name: str) -> str:
     """Return the function that does one scan: settings and states into variables, the assignments, the states back.
 
     Parameters
     ----------
-    unit : Unit
+    unit : CUnit
         The unit.
     program : Program
         Its program, or that for automatic scans.
@@ -160,11 +160,11 @@ def _wanted(program: Program) -> set[str]:
     return wanted | ({*program.recorded, *(line.source for line in program.lines)} - assigned)
 
 
-def _variable(unit: Unit, name: str, changes: bool, value: str) -> str:
+def _variable(unit: CUnit, name: str, changes: bool, value: str) -> str:
     return f"    {'' if changes else 'const '}{unit.type(name)} {unit.names[name]} = {value};"
 
 
-def _assignments(unit: Unit, program: Program, there: set[str]) -> Iterable[str]:
+def _assignments(unit: CUnit, program: Program, there: set[str]) -> Iterable[str]:
     times = [a.name for a in program.body]
     for assign in explicit(program):
         value = unit.writer.text(assign.value)
@@ -176,7 +176,7 @@ def _assignments(unit: Unit, program: Program, there: set[str]) -> Iterable[str]
         yield said(code, f"{assign.text} [{assign.unit}]")
 
 
-def _entering(unit: Unit, line: Line) -> list[str]:
+def _entering(unit: CUnit, line: Line) -> list[str]:
     """Return how the newest value takes the place of the oldest in a delay line."""
     place = f"state->{unit.line(line)}"
     length = unit.length(line) if unit.own_lines else f"{place}_length"

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats, Integers
 from pidemu.backends import python
 from pidemu.backends.cache import warn
-from pidemu.backends.runner import Block, Floats, Run, Runner
+from pidemu.backends.runner import Block, Run, Runner
 from pidemu.errors import EngineError, suggest
 from pidemu.program.ir import Program, Structure
 
@@ -253,9 +253,7 @@ def one_by_one(structure: Structure, engine: Engine) -> Block:
     """Return what runs the loops of a block one after the other."""
     bare = structure.bare()
 
-    def run(
-        values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: npt.NDArray[np.int64], at: int, records: Floats
-    ) -> None:
+    def run(values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: Integers, at: int, records: Floats) -> None:
         scans, rows = records.shape[1], rings.shape[1]
         for i in range(records.shape[2]):
             program = replace(bare, values=tuple(values[:, i].tolist()), initial=tuple(states[:, i].tolist()))

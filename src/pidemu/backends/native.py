@@ -20,10 +20,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.backends.c import library
 from pidemu.backends.cache import folder, keep, load
 from pidemu.backends.python import in_precision
-from pidemu.backends.runner import Floats, Run, Runner
+from pidemu.backends.runner import Run, Runner
 from pidemu.errors import EngineError
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise

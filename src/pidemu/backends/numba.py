@@ -11,12 +11,12 @@ from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats, Integers
 from pidemu.backends.cache import is_kept
 from pidemu.backends.numba_store import SUFFIX, Store, python_version
 from pidemu.backends.numba_text import WIDTH, block_text, module_text, record_text
-from pidemu.backends.runner import Block, Floats, Run, Runner
+from pidemu.backends.runner import Block, Run, Runner
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 
@@ -59,9 +59,7 @@ def block(structure: Structure) -> Block:
     """
     function = _block_module(structure).block
 
-    def run(
-        values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: npt.NDArray[np.int64], at: int, records: Floats
-    ) -> None:
+    def run(values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: Integers, at: int, records: Floats) -> None:
         assert states.flags.c_contiguous
         assert rings.flags.c_contiguous
         assert all(x.flags.c_contiguous for x in records)  # what is written to must not be a copy

@@ -10,10 +10,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.backends.numpy_text import Plan, planned
+from pidemu.arrays import Floats, Integers
+from pidemu.backends.numpy_text import BlockPlan, planned
 from pidemu.backends.numpy_values import scan_of
 from pidemu.backends.python import in_precision
-from pidemu.backends.runner import Block, Floats, Run, Runner
+from pidemu.backends.runner import Block, Run, Runner
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 
@@ -21,7 +22,6 @@ WIDTH: Final = 4096
 """Loops per block: the calls' own time is then a quarter of the whole; wider blocks gain little and take more memory."""
 
 _Array = npt.NDArray[Any]
-_Lengths = npt.NDArray[np.int64]
 
 
 @lru_cache(maxsize=512)
@@ -38,7 +38,7 @@ def block(structure: Structure) -> Block:
     count = len(program.coefficients)
     plan, scans = _scans(program)
 
-    def run(values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: _Lengths, at: int, records: Floats) -> None:
+    def run(values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: Integers, at: int, records: Floats) -> None:
         width = records.shape[2]
         rows = zip(
             *records,
@@ -59,7 +59,7 @@ def block(structure: Structure) -> Block:
     return run
 
 
-def _scans(program: Program) -> tuple[Plan, Callable[..., list[_Array]]]:
+def _scans(program: Program) -> tuple[BlockPlan, Callable[..., list[_Array]]]:
     scan = scan_of(program)
     plan = planned(scan)
     ufuncs = {v.what for i, v in enumerate(scan.values) if scan.computed(i)} - {"copy", "select"} | {"logical_not"}
@@ -95,14 +95,14 @@ def _from(ring: Floats, scan: int) -> Iterator[Floats]:
     return cycle([*ring[first:], *ring[:first]])
 
 
-def _leaving(ring: Floats, lengths: _Lengths, at: int) -> Iterator[Floats]:
+def _leaving(ring: Floats, lengths: Integers, at: int) -> Iterator[Floats]:
     """Return what leaves a delay line, scan after scan, the first being scan `at`."""
     if lengths.size and (lengths == lengths[0]).all():
         return _from(ring, at - int(lengths[0]))
     return _gathered(ring, lengths, at)
 
 
-def _gathered(ring: Floats, lengths: _Lengths, at: int) -> Iterator[Floats]:
+def _gathered(ring: Floats, lengths: Integers, at: int) -> Iterator[Floats]:
     assert ring.flags.c_contiguous  # its rows are read from one row after the other
     rows, width = ring.shape
     flat = ring.reshape(-1)

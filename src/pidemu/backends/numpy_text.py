@@ -9,14 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from pidemu.backends.numpy_values import Kind, Scan, Value
+from pidemu.backends.numpy_values import Kind, ScanGraph, ScanValue
 
 _LETTERS: Final = {"number": "n", "input": "x", "coefficient": "k", "late": "l", "start": "s"}
 _END: Final = 1 << 30
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class BlockPlan:
     """How a block is run.
 
     Attributes
@@ -44,12 +44,12 @@ class Plan:
     operations: int
 
 
-def planned(scan: Scan) -> Plan:
+def planned(scan: ScanGraph) -> BlockPlan:
     """Return the function's text for what a scan computes, and what it needs.
 
     Parameters
     ----------
-    scan : Scan
+    scan : ScanGraph
         What a scan computes.
     """
     homes = _homes(scan)
@@ -64,7 +64,7 @@ def planned(scan: Scan) -> Plan:
     return printer.plan(live)
 
 
-def _homes(scan: Scan) -> dict[int, str]:
+def _homes(scan: ScanGraph) -> dict[int, str]:
     """Return where values are computed that have a row of their own: in the records, or in a delay line.
 
     Where a state may be bound to a line's row, which is filled anew when it has left the line, the row is filled last, with a copy.
@@ -75,11 +75,11 @@ def _homes(scan: Scan) -> dict[int, str]:
     return {v: row for v, row in reversed(rows) if scan.computed(v) and scan.values[v].kind == "float64"}
 
 
-def _results(scan: Scan) -> list[int]:
+def _results(scan: ScanGraph) -> list[int]:
     return [*scan.finals, *scan.recorded, *scan.entering]
 
 
-def _live(scan: Scan) -> set[int]:
+def _live(scan: ScanGraph) -> set[int]:
     """Return every value that is needed."""
     live: set[int] = set()
     found = _results(scan)
@@ -91,7 +91,7 @@ def _live(scan: Scan) -> set[int]:
     return live
 
 
-def _carried(scan: Scan, homes: dict[int, str]) -> list[int]:
+def _carried(scan: ScanGraph, homes: dict[int, str]) -> list[int]:
     """Return the states that are in buffers; where a buffer would have to serve two states, the second gets a copy.
 
     So does a state that takes what leaves a delay line and hands it on: by the next scan's end the line's row is written anew.
@@ -109,13 +109,13 @@ def _carried(scan: Scan, homes: dict[int, str]) -> list[int]:
     return [s for s in states if _in_buffer(scan, homes, scan.starts[s])]
 
 
-def _copy(scan: Scan, state: int) -> None:
+def _copy(scan: ScanGraph, state: int) -> None:
     final = scan.finals[state]
     scan.finals[state] = len(scan.values)
-    scan.values.append(Value("copy", (final,), scan.values[final].kind, f"state {state}"))
+    scan.values.append(ScanValue("copy", (final,), scan.values[final].kind, f"state {state}"))
 
 
-def _in_buffer(scan: Scan, homes: dict[int, str], value: int) -> bool:
+def _in_buffer(scan: ScanGraph, homes: dict[int, str], value: int) -> bool:
     """Tell whether a value is in a buffer when a scan ends.
 
     What a state held when the scan began is where that state's last value was put in the scan before, and so on: a history of
@@ -131,7 +131,7 @@ def _in_buffer(scan: Scan, homes: dict[int, str], value: int) -> bool:
     return scan.computed(value) and value not in homes
 
 
-def _spread(scan: Scan, homes: dict[int, str], last: dict[int, int]) -> None:
+def _spread(scan: ScanGraph, homes: dict[int, str], last: dict[int, int]) -> None:
     """Compute one side of a select where its result goes, if that side ends there."""
     for v in sorted(last, reverse=True):
         if v in homes and scan.values[v].what == "select":
@@ -144,7 +144,7 @@ def _spread(scan: Scan, homes: dict[int, str], last: dict[int, int]) -> None:
 class _Printer:
     """Gives out buffers and prints the operations, in order."""
 
-    def __init__(self, scan: Scan, homes: dict[int, str], carried: list[int], last: dict[int, int]) -> None:
+    def __init__(self, scan: ScanGraph, homes: dict[int, str], carried: list[int], last: dict[int, int]) -> None:
         self.scan, self.homes, self.last = scan, homes, last
         self.kinds: list[Kind] = []
         self.free: list[str] = []
@@ -157,7 +157,7 @@ class _Printer:
                 self.where[v] = self._given(v, value)
         self.free += [f"b{b}" for s, b in self.carried.items() if last.get(scan.starts[s], -1) < 0]
 
-    def _given(self, v: int, value: Value) -> str:
+    def _given(self, v: int, value: ScanValue) -> str:
         if value.what == "number":
             self.numbers[f"n{v}"] = (float(value.label), value.kind)
             return f"n{v}"
@@ -190,7 +190,7 @@ class _Printer:
             rows = [(f"{letter}{i}", self.where[v]) for i, v in enumerate(results)]
             self.lines += [f"{row}[...] = {now}" for row, now in rows if row != now]
 
-    def _operation(self, v: int, value: Value) -> str:
+    def _operation(self, v: int, value: ScanValue) -> str:
         operands = [self.where[x] for x in value.of]
         ending = (self.where[x] for x in value.of if self._ends(x, v) and self.scan.values[x].kind == value.kind)
         into = self.homes.get(v) or next(ending, None) or self._buffer(value.kind)
@@ -198,7 +198,7 @@ class _Printer:
         self.lines.append(f"{into}[...] = {operands[0]}" if copies else f"{value.what}({', '.join([*operands, into])})")
         return into
 
-    def _select(self, v: int, value: Value) -> str:
+    def _select(self, v: int, value: ScanValue) -> str:
         """Print a select: one side is there already or is copied, the other is put where the condition holds, or does not."""
         test, yes, no = value.of
         home = self.homes.get(v)
@@ -228,7 +228,7 @@ class _Printer:
             pairs += zip(lost, idle, strict=True)
         return [(name, now) for name, now in pairs if name != now]
 
-    def plan(self, live: set[int]) -> Plan:
+    def plan(self, live: set[int]) -> BlockPlan:
         """Return the finished text, and what it needs."""
         scan = self.scan
         inputs = tuple(int(scan.values[v].label) for v in sorted(live) if scan.values[v].what == "input")
@@ -249,4 +249,4 @@ class _Printer:
         ]
         if not (self.lines or bound):
             text.insert(-1, "        pass")
-        return Plan("\n".join(text) + "\n", self.numbers, tuple(self.kinds), self.carried, inputs, len(self.lines))
+        return BlockPlan("\n".join(text) + "\n", self.numbers, tuple(self.kinds), self.carried, inputs, len(self.lines))

@@ -20,7 +20,7 @@ _COMPARISONS: Final = {
 _LOGICAL: Final = {"and": "logical_and", "or": "logical_or"}
 
 
-class Value(NamedTuple):
+class ScanValue(NamedTuple):
     """A value of one scan.
 
     Attributes
@@ -42,12 +42,12 @@ class Value(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Scan:
+class ScanGraph:
     """What a scan computes.
 
     Attributes
     ----------
-    values : list of Value
+    values : list of ScanValue
         All values; what one is computed from comes before it.
     starts, finals : list of int
         The states' values before and after the scan.
@@ -57,7 +57,7 @@ class Scan:
         What enters the delay lines.
     """
 
-    values: list[Value]
+    values: list[ScanValue]
     starts: list[int]
     finals: list[int]
     recorded: list[int]
@@ -68,7 +68,7 @@ class Scan:
         return self.values[value].what not in GIVEN
 
 
-def scan_of(program: Program) -> Scan:
+def scan_of(program: Program) -> ScanGraph:
     """Return what one scan of a program computes.
 
     Parameters
@@ -90,7 +90,7 @@ def scan_of(program: Program) -> Scan:
         held[assign.name] = v.expression(assign.value, held)
     finals = [v.cast(held[q.name], _kind(program, q.name)) for q in program.states]
     recorded = [v.numeric(held[name]) for name in program.recorded]
-    return Scan(v.all, starts, finals, recorded, [v.numeric(held[line.source]) for line in program.lines])
+    return ScanGraph(v.all, starts, finals, recorded, [v.numeric(held[line.source]) for line in program.lines])
 
 
 def _kind(program: Program, name: str) -> Precision:
@@ -101,11 +101,11 @@ class _Values:
     """Collects values; one that is there already is not computed again."""
 
     def __init__(self) -> None:
-        self.all: list[Value] = []
-        self._place: dict[Value, int] = {}
+        self.all: list[ScanValue] = []
+        self._place: dict[ScanValue, int] = {}
 
     def _add(self, what: str, *of: int, kind: Kind, label: str = "") -> int:
-        value = Value(what, of, kind, label)
+        value = ScanValue(what, of, kind, label)
         if value not in self._place:
             self._place[value] = len(self.all)
             self.all.append(value)

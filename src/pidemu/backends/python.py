@@ -10,9 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.backends.comments import comment_text, python_head
 from pidemu.backends.expressions import literal, render
-from pidemu.backends.runner import Floats, Run, Runner
+from pidemu.backends.runner import Run, Runner
 from pidemu.program.ir import Program, Quantity, Structure, names_in
 from pidemu.program.precision import explicit
 from pidemu.program.specialise import specialise

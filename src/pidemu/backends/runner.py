@@ -6,10 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-import numpy.typing as npt
+from pidemu.arrays import Floats, Integers
 
-Floats = npt.NDArray[np.float64]
 Run = Callable[[list[Any], Sequence[Floats], int], Floats]
 
 
@@ -43,7 +41,7 @@ class Block(Protocol):
         states: Floats,
         signals: Floats,
         rings: Floats,
-        lengths: npt.NDArray[np.int64],
+        lengths: Integers,
         at: int,
         records: Floats,
     ) -> None:

@@ -11,13 +11,12 @@ import numpy as np
 
 from pidemu.backends.python import compiled
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side
+from pidemu.certificate.scaled_controller import ScaledController
 from pidemu.errors import PidemuError
 from pidemu.program.builder import build
 from pidemu.program.ir import StateRole
-from pidemu.records.files import Record
-from pidemu.records.sampling import Scale
 from pidemu.records.standard import REST
+from pidemu.settings.ranges import UNLIMITED
 
 _KEPT: Final = (StateRole.INTEGRAL, StateRole.COUNTS, StateRole.INTEGRAL_REMAINDER)
 """States that an integral is kept in: the sum; with whole numbers the output's sum and the remainder."""
@@ -26,7 +25,6 @@ _RANGE: Final = (1e-18, 50.0)
 _STEPS: Final = 50
 """Bisections: more than a float32 can tell apart."""
 _SCANS: Final = 6
-_FREE: Final = (-1e9, 1e9)
 _DIFFERS: Final = 0.01
 """Relative difference of smallest errors that is worth a word."""
 _MEASURED: Final = 1e-3
@@ -35,7 +33,7 @@ _NEGLIGIBLE: Final = 1e-4
 """Below this no digits are given [% of span]."""
 
 
-def smallest_error(side: Side) -> float:
+def smallest_error(side: ScaledController) -> float:
     """Return the smallest error that still integrates with the output at 50 % [% of the measurement span].
 
     It is found by emulation, with the setpoint above a measurement of 50 %: the controller's own program starts in the steady state
@@ -45,7 +43,7 @@ def smallest_error(side: Side) -> float:
 
     Parameters
     ----------
-    side : Side
+    side : ScaledController
         A controller with integral action.
 
     Returns
@@ -60,13 +58,12 @@ def smallest_error(side: Side) -> float:
     """
     a = side.own.at_rest
     plain = replace(a, error=replace(a.error, shape="linear"), integral=replace(a.integral, deadband=None, limits=None))
-    scale = Scale(side.settings)
-    program = build(plain, side.scan, limits=_FREE, initial_output=scale.output_own(50.0))
+    pv, op = side.settings.own_ranges
+    program = build(plain, side.scan, limits=UNLIMITED, initial_output=op.from_percent(REST))
     functions = compiled(program)
     names = [q.name for q in program.states]
     watched = [names.index(name) for name in _KEPT if name in names] or [names.index(StateRole.OUTPUT)]
-    rest = scale.own(Record(sp=np.array([REST, REST + 1.0]), pv=np.array([REST, REST])))
-    at, unit = float(rest.sp[0]), float(rest.sp[1] - rest.sp[0])
+    at, unit = pv.from_percent(REST), pv.change_from_percent(1.0)
 
     def moves(error: float) -> bool:
         state, sp = list(functions.initial), at + error * unit
@@ -86,7 +83,7 @@ def smallest_error(side: Side) -> float:
     return math.exp(moving)
 
 
-def arithmetic_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def arithmetic_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield the smallest errors that two controllers integrate, where these differ and one is large enough to be measured."""
     both = (source, target)
     precisions = [side.own.arithmetic.type for side in both]

@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Iterator
 
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side, alike, unlimited
+from pidemu.certificate.scaled_controller import ScaledController, alike
+from pidemu.settings.ranges import infinite_where_none
 
 Figures = dict[str, tuple[float, float]]
 Pair = tuple[float, float]
 
 
-def limit_differences(source: Side, target: Side, *, stated: bool = False) -> Iterator[NonlinearDifference]:
+def limit_differences(source: ScaledController, target: ScaledController, *, stated: bool = False) -> Iterator[NonlinearDifference]:
     """Yield how output limits as delivered, unless others are `stated`, and limits of the integral itself differ (section 5)."""
     both = (source, target)
     figures: Figures = {}
@@ -36,7 +37,7 @@ def limit_differences(source: Side, target: Side, *, stated: bool = False) -> It
         yield NonlinearDifference("limits", " ".join(parts), figures)
 
 
-def _in_own_units(target: Side) -> str:
+def _in_own_units(target: ScaledController) -> str:
     """Return what 0 to 100 % is on a target that computes in engineering units."""
     if not target.engineering:
         return ""
@@ -54,28 +55,29 @@ def _span(limits: Pair, unit: str) -> str:
     return f"{low:g} to {high:g} {unit}"
 
 
-def _integral_limits(side: Side) -> Pair:
+def _integral_limits(side: ScaledController) -> Pair:
     """Return the limits of the integral term [% of the output span]; infinite where there are none."""
     a = side.own
     if a.integral.limits is None:
         return -math.inf, math.inf
     ends = zip((a.integral.limits.low, a.integral.limits.high), side.limits, strict=True)
-    low, high = (own if given is None or isinstance(given, str) else given for given, own in ends)
-    given = unlimited((low, high))
+    low, high = (own if end is None or isinstance(end, str) else end for end, own in ends)
+    given = infinite_where_none((low, high))
     gain = {"ki e": 1.0, "e/Ti": a.kp, "e": a.ki}[a.integral.holds]
-    zero = side.settings.own_ranges[1].low
-    low, high = sorted((gain * x - zero) * side.op_percent for x in given)
+    low, high = sorted(side.op.in_percent(gain * x) for x in given)
     return low, high
 
 
-def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def error_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield what is done to the error, and where the integral stands still for it."""
     figures = {
         "error: half width of the band [% of PV span]": _of(source, target, _band),
         "error: gain within the band [-]": _of(source, target, lambda side: side.own.error.gain if _band(side) else 1.0),
         "error: where a gain that grows with it is 1 [% of PV span]": _of(source, target, _over),
         "error: gain near zero [-]": _of(source, target, _linearity),
-        "integral deadband [% of PV span]": _of(source, target, lambda side: (side.own.integral.deadband or 0.0) * side.pv_percent),
+        "integral deadband [% of PV span]": _of(
+            source, target, lambda side: side.pv.change_in_percent(side.own.integral.deadband or 0.0)
+        ),
     }
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     if found or _fine_print(source) != _fine_print(target):
@@ -83,28 +85,28 @@ def error_differences(source: Side, target: Side) -> Iterator[NonlinearDifferenc
         yield NonlinearDifference("error", f"The error is used differently: {words}.", found)
 
 
-def _band(side: Side) -> float:
-    return (side.own.error.band or 0.0) * side.pv_percent if side.own.error.shape == "gap" else 0.0
+def _band(side: ScaledController) -> float:
+    return side.pv.change_in_percent(side.own.error.band or 0.0) if side.own.error.shape == "gap" else 0.0
 
 
-def _over(side: Side) -> float:
-    return side.own.error.over * side.pv_percent if side.own.error.shape in ("squared", "gain-linear") else math.inf
+def _over(side: ScaledController) -> float:
+    return side.pv.change_in_percent(side.own.error.over) if side.own.error.shape in ("squared", "gain-linear") else math.inf
 
 
-def _linearity(side: Side) -> float:
+def _linearity(side: ScaledController) -> float:
     """Return the gain near zero of a shape that has no band."""
     error = side.own.error
     return {"squared": 0.0, "gain-linear": error.linearity or 0.0}.get(error.shape, 1.0)
 
 
-def _fine_print(side: Side) -> tuple[object, ...]:
+def _fine_print(side: ScaledController) -> tuple[object, ...]:
     """Return what is not a number of a shape, but that of the mode in cascade."""
     a, error = side.own, side.own.error
     return () if not a.is_shaped else (error.shape, error.subtracted, error.zero_crossing, a.shapes_integral, a.shapes_proportional)
 
 
-def _error_words(side: Side) -> str:
-    a, error, band = side.own, side.own.error, (side.own.integral.deadband or 0.0) * side.pv_percent
+def _error_words(side: ScaledController) -> str:
+    a, error, band = side.own, side.own.error, side.pv.change_in_percent(side.own.integral.deadband or 0.0)
     still = f"does not integrate within {band:.4g} %" if not alike(band, 0.0) else ""
     if not a.is_shaped:
         return still or "uses it as it is"
@@ -121,21 +123,23 @@ def _error_words(side: Side) -> str:
     return f"{text}{where}{' and ' + still if still else ''}"
 
 
-def output_differences(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def output_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield rate limit, deadband and step of the output where they differ."""
     yield from _numbers(
         "output",
         (source, target),
         {
-            "output rate limit [%/s]": _of(source, target, lambda side: _endless(side.own.output.rate) * side.op_percent),
-            "output deadband [%]": _of(source, target, lambda side: (side.own.output.deadband or 0.0) * side.op_percent),
-            "output step [%]": _of(source, target, lambda side: (side.own.output.resolution or 0.0) * side.op_percent),
+            "output rate limit [%/s]": _of(source, target, lambda side: side.op.change_in_percent(_endless(side.own.output.rate))),
+            "output deadband [%]": _of(source, target, lambda side: side.op.change_in_percent(side.own.output.deadband or 0.0)),
+            "output step [%]": _of(source, target, lambda side: side.op.change_in_percent(side.own.output.resolution or 0.0)),
         },
         [],
     )
 
 
-def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False) -> Iterator[NonlinearDifference]:
+def setpoint_differences(
+    source: ScaledController, target: ScaledController, *, in_cascade: bool = False
+) -> Iterator[NonlinearDifference]:
     """Yield the setpoint's rate limit where it differs, and what becomes of the setpoint at power-up and in manual.
 
     With `in_cascade` the remote setpoint alone counts, which some do not limit.
@@ -152,7 +156,10 @@ def setpoint_differences(source: Side, target: Side, *, in_cascade: bool = False
     ]
     free = [in_cascade and side.own.setpoint.rate_counts == "local" for side in (source, target)]
     up, down = (
-        tuple(math.inf if none else rate * side.pv_percent for none, rate, side in zip(free, rates, (source, target), strict=True))
+        tuple(
+            math.inf if none else side.pv.change_in_percent(rate)
+            for none, rate, side in zip(free, rates, (source, target), strict=True)
+        )
         for rates in zip(*((_endless(s.own.setpoint.rate), _endless(s.own.setpoint.fall)) for s in (source, target)), strict=True)
     )
     rates = {"setpoint rate limit [%/s]": (up[0], up[1]), "setpoint rate limit downwards [%/s]": (down[0], down[1])}
@@ -167,11 +174,13 @@ def _endless(rate: float | None) -> float:
     return math.inf if rate is None else rate
 
 
-def _from_zero(side: Side) -> bool:
+def _from_zero(side: ScaledController) -> bool:
     return side.own.setpoint.starts == "zero" and side.own.setpoint.rate is not None
 
 
-def _numbers(aspect: str, both: tuple[Side, Side], figures: Figures, words: list[str]) -> Iterator[NonlinearDifference]:
+def _numbers(
+    aspect: str, both: tuple[ScaledController, ScaledController], figures: Figures, words: list[str]
+) -> Iterator[NonlinearDifference]:
     """Yield the figures that differ as one difference, with further sentences."""
     found = {name: pair for name, pair in figures.items() if not alike(*pair)}
     parts = []
@@ -187,7 +196,7 @@ def _or_none(x: float, unit: str) -> str:
     return f"{x:.4g} {unit}" if x and math.isfinite(x) else "none"
 
 
-def _of(source: Side, target: Side, number: Callable[[Side], float]) -> Pair:
+def _of(source: ScaledController, target: ScaledController, number: Callable[[ScaledController], float]) -> Pair:
     return number(source), number(target)
 
 

@@ -9,10 +9,8 @@ from typing import Final
 import numpy as np
 
 from pidemu.card.load import Card
-from pidemu.certificate.scaled_controller import Side, sides
-from pidemu.records.files import Record
-from pidemu.records.playback import Timing
-from pidemu.records.sampling import Scale, controller_for, limits_for
+from pidemu.certificate.scaled_controller import ScaledController, scaled_controllers
+from pidemu.controller.bench import Bench, limits_in_percent
 from pidemu.records.standard import REST
 from pidemu.settings.settings import Settings
 
@@ -129,8 +127,8 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     >>> (found.source, found.target, found.permanent)
     (50.0, 20.0, True)
     """
-    both = sides(source, target, scans)
-    low, high = limits_for(source, None, (0.0, 100.0))
+    both = scaled_controllers(source, target, scans)
+    low, high = limits_in_percent(source, None)
     gain = abs(source.law().moments()[1])
     move = min(_MOVE * (high - low) / 100, _ERROR * gain)
     error = move / gain if gain else _ERROR
@@ -139,7 +137,7 @@ def limit_shift(source: Settings, target: Settings, scans: tuple[float, float], 
     return LimitShift(error, start, high, ends[0], ends[1], both[0].integrates, both[1].integrates)
 
 
-def _after(side: Side, error: float, start: float, limits: tuple[float, float]) -> float:
+def _after(side: ScaledController, error: float, start: float, limits: tuple[float, float]) -> float:
     """Return the output [% of its span] after the measurement has moved by `error`, such that the output rises, and come back."""
     a = side.own
     times = (
@@ -150,11 +148,9 @@ def _after(side: Side, error: float, start: float, limits: tuple[float, float]) 
     n = int(min(max(_SLOW * times / side.scan, _SCANS), _MOST_SCANS))
     x = np.arange(5 * n + 1) / n
     pv = REST - side.sign * error * np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 0.0])
-    scale = Scale(side.settings)
-    own = scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
-    controller, _ = controller_for(side.settings, Timing(side.scan), "reverse", limits, start)
-    controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(start))
-    return round(float(scale.output_percent(controller.run(own.sp, own.pv))[-1]), 6) + 0.0
+    bench = Bench.in_percent(side.settings, side.scan, sp=REST, pv=REST, op=start, limits=limits)
+    last = float(bench.at_rest().run(bench.sp, side.pv.from_percent(pv))[-1])
+    return round(side.op.in_percent(last), 6) + 0.0
 
 
 def choices_that_hold(card: Card, chosen: Mapping[str, str]) -> tuple[dict[str, str], ...]:

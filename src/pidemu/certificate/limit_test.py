@@ -10,26 +10,27 @@ from pidemu.card.datasheet.at_limits import limit_rows
 from pidemu.certificate.limit_shift import limit_shift
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.recovery import Recoveries, Recovery, recoveries
-from pidemu.certificate.scaled_controller import Side
-from pidemu.certificate.trials import Bench, Plan
+from pidemu.certificate.scaled_controller import ScaledController
+from pidemu.certificate.trials import TrialPlan, TriedController
 
-"""Relative difference of tracking times that counts."""
 _MORE: Final = 2.0
 """With noise the outputs are so many times further apart than without, where that is worth another sentence."""
 
 
-def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], plan: Plan) -> Iterator[NonlinearDifference]:
+def windup_differences(
+    both: tuple[ScaledController, ScaledController], tried: tuple[TriedController, TriedController], plan: TrialPlan
+) -> Iterator[NonlinearDifference]:
     """Yield how differently two controllers come back from an output limit, by emulation; nothing where they do not.
 
     Without integral action in both, what an excursion to a limit and back leaves behind.
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
-    benches : tuple of Bench
+    tried : tuple of TriedController
         The same, to be tried.
-    plan : Plan
+    plan : TrialPlan
         What is tried.
 
     Raises
@@ -42,7 +43,7 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     if not (source.integrates or target.integrates):
         yield from _without_integral(both, scans)
         return
-    found = recoveries(benches, plan, scans)
+    found = recoveries(tried, plan, scans)
     if not found.differ:
         return
     figures = {
@@ -54,7 +55,7 @@ def windup_differences(both: tuple[Side, Side], benches: tuple[Bench, Bench], pl
     yield NonlinearDifference("windup", story(found, plan, both), figures)
 
 
-def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
+def _without_integral(both: tuple[ScaledController, ScaledController], scans: tuple[float, float]) -> Iterator[NonlinearDifference]:
     """Yield what a limit leaves behind for good."""
     source, target = both
     gains = [abs(side.settings.law().moments()[1]) for side in both]
@@ -64,12 +65,12 @@ def _without_integral(both: tuple[Side, Side], scans: tuple[float, float]) -> It
         yield NonlinearDifference("windup", shift.text, figures)
 
 
-def unknown_windup(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDifference]:
+def unknown_windup(both: tuple[ScaledController, ScaledController], reason: str) -> Iterator[NonlinearDifference]:
     """Yield what the cards say where the two cannot be emulated and their schemes are not the same.
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
     reason : str
         Why they cannot be.
@@ -81,25 +82,26 @@ def unknown_windup(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDi
     yield NonlinearDifference("windup", text, {})
 
 
-def _same_scheme(mine: Side, other: Side) -> bool:
-    return mine.own.integral.windup.acts_like(other.own.integral.windup)
+def _same_scheme(mine: ScaledController, other: ScaledController) -> bool:
+    a, b = mine.own, other.own
+    return a.integral.windup.acts_like(b.integral.windup)
 
 
-def _scheme(side: Side) -> str:
+def _scheme(side: ScaledController) -> str:
     """Return what happens at a limit, as the data sheet has it."""
     return dict(limit_rows(side.settings.equation))["at a limit"]
 
 
-def story(found: Recoveries, plan: Plan, both: tuple[Side, Side]) -> str:
+def story(found: Recoveries, plan: TrialPlan, both: tuple[ScaledController, ScaledController]) -> str:
     """Return the differences as sentences with times.
 
     Parameters
     ----------
     found : Recoveries
         What both did.
-    plan : Plan
+    plan : TrialPlan
         What was tried.
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target.
     """
     old, new = found.both
@@ -149,11 +151,11 @@ def _on_each(outputs: tuple[float, float]) -> str:
     return f"{output_number(outputs[0])} % on the old controller and {output_number(outputs[1])} % on the new one"
 
 
-def _leaves(r: Recovery, plan: Plan) -> str:
+def _leaves(r: Recovery, plan: TrialPlan) -> str:
     if math.isinf(r.stays):
         return f"stays there for the {3 * plan.time:.4g} s that this lasts"
     return f"leaves the limit after {r.stays:.4g} s" if r.stays else "leaves the limit at once"
 
 
-def _both(r: Recovery, plan: Plan) -> str:
+def _both(r: Recovery, plan: TrialPlan) -> str:
     return _leaves(r, plan).replace("leaves", "leave", 1).replace("stays", "stay", 1)

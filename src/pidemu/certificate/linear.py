@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.models import Band, Certificate, Kick, PathComparison
 from pidemu.law.law import Law, PathName
 from pidemu.law.rational import Response
@@ -16,7 +16,6 @@ from pidemu.law.rational import Response
 if TYPE_CHECKING:
     from pidemu.process.process import Process
 
-Floats = npt.NDArray[np.float64]
 
 _POINTS: Final = 300
 _ROUNDING: Final = 1e-14

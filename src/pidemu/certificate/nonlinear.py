@@ -9,10 +9,10 @@ from pidemu.certificate.arithmetic import arithmetic_differences
 from pidemu.certificate.differences import error_differences, limit_differences, output_differences, setpoint_differences
 from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
 from pidemu.certificate.models import NonlinearDifference
-from pidemu.certificate.scaled_controller import Side, sides
-from pidemu.certificate.trials import Bench, Plan, planned
+from pidemu.certificate.scaled_controller import ScaledController, scaled_controllers
+from pidemu.certificate.trials import TrialPlan, TriedController, planned
+from pidemu.controller.bench import limits_in_percent
 from pidemu.errors import PidemuError
-from pidemu.records.sampling import limits_for
 from pidemu.settings.action import acting_alike
 from pidemu.settings.range_relation import Relation, relation
 from pidemu.settings.settings import Settings
@@ -74,8 +74,8 @@ def nonlinear_differences(
     >>> round(before, 9), round(after, 9)  # the error is half the size, with the measurement above the setpoint; P comes on top
     (0.0, -4.04)
     """
-    both = sides(source, target, scans)
-    trial = planned(both, time_and_size, limits_for(source, None, (0.0, 100.0)) if limits is None else limits)
+    both = scaled_controllers(source, target, scans)
+    trial = planned(both, time_and_size, limits_in_percent(source, None) if limits is None else limits)
     found = [
         *_emulated(both, trial),
         *_bias(*both),
@@ -88,31 +88,33 @@ def nonlinear_differences(
     return tuple(found)
 
 
-def _emulated(both: tuple[Side, Side], trial: Plan) -> Iterator[NonlinearDifference]:
+def _emulated(both: tuple[ScaledController, ScaledController], trial: TrialPlan) -> Iterator[NonlinearDifference]:
     """Yield what differs at limits and transfers, or what the cards say of it where it cannot be tried."""
     source, target = both
     related = relation(source.settings.pv_range, target.settings.pv_range, "pv_range")
     span = 1 / float(related.factor) if isinstance(related, Relation) else 1.0
-    benches = []
+    tried = []
     try:
         actions = acting_alike(target.settings, source.sign * target.sign)
         for side, action, share in zip(both, actions, (1.0, span), strict=True):
             name = side.name
-            benches.append(Bench(side, trial, action, share))
-            benches[-1].check()
+            tried.append(TriedController(side, trial, action, share))
+            tried[-1].check()
     except PidemuError as error:
         reason = f"{name} cannot be emulated: {error}"
         yield from unknown_windup(both, reason)
         yield from _unknown_transfer(both, reason)
         return
-    pair = benches[0], benches[1]
+    pair = tried[0], tried[1]
     yield from windup_differences(both, pair, trial)
     yield from _transfer(both, pair, trial)
 
 
-def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan) -> Iterator[NonlinearDifference]:
+def _transfer(
+    both: tuple[ScaledController, ScaledController], tried: tuple[TriedController, TriedController], trial: TrialPlan
+) -> Iterator[NonlinearDifference]:
     """Yield how differently the transfers between manual and automatic go (section 6)."""
-    (hand, auto), (new_hand, new_auto) = (bench.transfers() for bench in benches)
+    (hand, auto), (new_hand, new_auto) = (one.transfers() for one in tried)
     to_auto, to_manual = (auto, new_auto), (hand, new_hand)
     least = _BUMP if all(side.own.arithmetic.type == "float64" for side in both) else _ROUNDED_BUMP
     parts = []
@@ -131,7 +133,7 @@ def _transfer(both: tuple[Side, Side], benches: tuple[Bench, Bench], trial: Plan
         yield NonlinearDifference("transfer", " ".join(parts), figures)
 
 
-def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[NonlinearDifference]:
+def _unknown_transfer(both: tuple[ScaledController, ScaledController], reason: str) -> Iterator[NonlinearDifference]:
     """Yield what the cards say where the transfers cannot be tried."""
     ways = [f"{side.own.transfer.way.of_a_controller}; in manual it {_MANUAL[side.own.transfer.manual_output]}" for side in both]
     if ways[0] != ways[1]:
@@ -141,7 +143,7 @@ def _unknown_transfer(both: tuple[Side, Side], reason: str) -> Iterator[Nonlinea
         )
 
 
-def _each(both: tuple[Side, Side], words: list[str]) -> str:
+def _each(both: tuple[ScaledController, ScaledController], words: list[str]) -> str:
     """Return what each does, in brackets; nothing where it is the same."""
     if words[0] == words[1]:
         return ""
@@ -152,7 +154,7 @@ def _jumps(bumps: tuple[float, float]) -> str:
     return f"{output_number(bumps[0])} % on the old controller and {output_number(bumps[1])} % on the new one"
 
 
-def _bias(source: Side, target: Side) -> Iterator[NonlinearDifference]:
+def _bias(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield that the output of a positional target without integral rests on a bias, which no dial of the source holds."""
     if target.integrates or target.own.velocity or target.own.dahlin is not None or source.own.bias:
         return

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.certificate.trials import NOISE, STEPS, Bench, Course, Plan
-from pidemu.records.files import Floats
+from pidemu.arrays import Floats
+from pidemu.certificate.trials import NOISE, STEPS, Course, TrialPlan, TriedController
 
 _BEYOND: Final = 0.6
 """The output starts so near to the limit that it would need this part of the way that it goes where nothing limits it."""
@@ -77,7 +77,7 @@ class Recoveries:
         return self.short or self.late or self.apart or self.noisy is not None
 
 
-def recoveries(benches: tuple[Bench, Bench], plan: Plan, scans: tuple[float, float]) -> Recoveries:
+def recoveries(tried: tuple[TriedController, TriedController], plan: TrialPlan, scans: tuple[float, float]) -> Recoveries:
     """Return how both come back from a limit.
 
     Each is at rest first; then the measurement alone makes the error. Both are run without limits as well: what their linear laws
@@ -85,9 +85,9 @@ def recoveries(benches: tuple[Bench, Bench], plan: Plan, scans: tuple[float, flo
 
     Parameters
     ----------
-    benches : tuple of Bench
+    tried : tuple of TriedController
         Source and target.
-    plan : Plan
+    plan : TrialPlan
         Time, size and limits.
     scans : tuple of float
         Scan intervals [s].
@@ -98,14 +98,14 @@ def recoveries(benches: tuple[Bench, Bench], plan: Plan, scans: tuple[float, flo
         An output overflows.
     """
     high, low = plan.limits[1], plan.limits[0]
-    free, way = _free(benches, plan, STEPS, 2.0)
-    found = [b.course(STEPS, max(plan.middle, high - way), limited=True) for b in benches]
+    free, way = _free(tried, plan, STEPS, 2.0)
+    found = [b.course(STEPS, max(plan.middle, high - way), limited=True) for b in tried]
     both = _recovery(found[0], plan), _recovery(found[1], plan)
     ends = [[_at(c, t * plan.time) for t in (2.0, 5.0, 6.0)] for c in free]
     law = max(abs(x - y) for x, y in zip(*ends, strict=True))
     stays = both[0].stays, both[1].stays
     worth = max(max(scans) * (1 + 1e-9), _LATE * plan.time)
-    noisy, when = _noisy(benches, plan, low)
+    noisy, when = _noisy(tried, plan, low)
     return Recoveries(
         both=both,
         short=both[0].at_limit != both[1].at_limit,
@@ -116,9 +116,11 @@ def recoveries(benches: tuple[Bench, Bench], plan: Plan, scans: tuple[float, flo
     )
 
 
-def _free(benches: tuple[Bench, Bench], plan: Plan, part: tuple[str, str], until: float) -> tuple[list[Course], float]:
+def _free(
+    tried: tuple[TriedController, TriedController], plan: TrialPlan, part: tuple[str, str], until: float
+) -> tuple[list[Course], float]:
     """Return what both do without limits, and the way to the limit [% of the output span]: as far as both go beyond."""
-    free = [b.course(part, plan.middle, limited=False) for b in benches]
+    free = [b.course(part, plan.middle, limited=False) for b in tried]
     half = (plan.limits[1] - plan.limits[0]) / 2
     way = min(half, *(_BEYOND * abs(_at(c, until * plan.time) - plan.middle) for c in free))
     return free, max(way, _LEAST)
@@ -130,7 +132,7 @@ def _at(course: Course, time: float) -> float:
     return float(outputs[np.searchsorted(times, time - _HAIR * (times[1] - times[0])) - 1])
 
 
-def _recovery(course: Course, plan: Plan) -> Recovery:
+def _recovery(course: Course, plan: TrialPlan) -> Recovery:
     times, outputs = course
     step, (low, high) = float(times[1] - times[0]), plan.limits
     turn, zero, back = (np.searchsorted(times, t - _HAIR * step) for t in (2 * plan.time, _turned(plan), 5 * plan.time))
@@ -144,15 +146,15 @@ def _recovery(course: Course, plan: Plan) -> Recovery:
     return Recovery(reached, True, math.inf if off >= held.size else off * step, float(outputs[-1]))
 
 
-def _turned(plan: Plan) -> float:
+def _turned(plan: TrialPlan) -> float:
     """Return when the error has the other sign [s]."""
     return 2 * plan.time + plan.ramp / 2
 
 
-def _noisy(benches: tuple[Bench, Bench], plan: Plan, low: float) -> tuple[tuple[float, float] | None, float]:
+def _noisy(tried: tuple[TriedController, TriedController], plan: TrialPlan, low: float) -> tuple[tuple[float, float] | None, float]:
     """Return outputs on the way back from the limit with noise where they are furthest apart, and when [s]."""
-    free, way = _free(benches, plan, NOISE, 3.0)
-    found = [b.course(NOISE, min(plan.middle, low + way), limited=True) for b in benches]
+    free, way = _free(tried, plan, NOISE, 3.0)
+    found = [b.course(NOISE, min(plan.middle, low + way), limited=True) for b in tried]
     at = free[0][0]
     law = float(np.max(np.abs(np.subtract(*(_averaged(c, at, plan.time) for c in free)))))
     mine, other = (_averaged(c, at, plan.time) for c in found)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 from pidemu.algorithm.model import Algorithm
+from pidemu.settings.ranges import SignalRange, infinite_where_none
 from pidemu.settings.settings import Settings
-
-NO_LIMIT: Final = 1e30
-"""A limit beyond this is none: cards write their largest float32 for it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ScaledController:
     """One of two controllers.
 
     Attributes
@@ -40,14 +37,14 @@ class Side:
         return self.settings.equation.signals == "engineering"
 
     @property
-    def pv_percent(self) -> float:
-        """Percent of the measurement's span per unit that the card computes in; 1 where no range is given."""
-        return 100 / self.settings.own_ranges[0].span
+    def pv(self) -> SignalRange:
+        """The measurement's range in the units that the card computes in; 0 to 100 where none is given."""
+        return self.settings.own_ranges.pv
 
     @property
-    def op_percent(self) -> float:
-        """The same for the output."""
-        return 100 / self.settings.own_ranges[1].span
+    def op(self) -> SignalRange:
+        """The same of the output."""
+        return self.settings.own_ranges.op
 
     @property
     def integrates(self) -> bool:
@@ -62,14 +59,12 @@ class Side:
     @property
     def limits(self) -> tuple[float, float]:
         """The card's output limits [as it computes]; infinite where there is none."""
-        return unlimited(self.settings.equation.output.limits)
+        return infinite_where_none(self.settings.equation.output.limits)
 
     @property
     def limits_percent(self) -> tuple[float, float]:
         """The same [% of the output span]; where no range is given 0 to 100 is taken for it."""
-        zero = self.settings.own_ranges[1].low
-        low, high = self.limits
-        return (low - zero) * self.op_percent, (high - zero) * self.op_percent
+        return self.op.limits_in_percent(self.limits)
 
     @property
     def unit(self) -> str:
@@ -77,18 +72,12 @@ class Side:
         return "engineering units" if self.engineering else "%"
 
 
-def sides(source: Settings, target: Settings, scans: tuple[float, float]) -> tuple[Side, Side]:
+def scaled_controllers(source: Settings, target: Settings, scans: tuple[float, float]) -> tuple[ScaledController, ScaledController]:
     """Return source and target at their scan intervals [s]."""
     names = ("the source", "the target") if source.card.id == target.card.id else (source.card.id, target.card.id)
     both = zip(names, (source, target), scans, strict=True)
-    first, second = (Side(name, s, h, s.algorithm(own_units=True, scan=h)) for name, s, h in both)
+    first, second = (ScaledController(name, s, h, s.algorithm(own_units=True, scan=h)) for name, s, h in both)
     return first, second
-
-
-def unlimited(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return limits with infinity for those that are none, such as the largest float32."""
-    low, high = (math.copysign(math.inf, x) if abs(x) >= NO_LIMIT else x for x in limits)
-    return low, high
 
 
 def alike(x: float, y: float) -> bool:

@@ -7,23 +7,19 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.linear import time_scale
 from pidemu.certificate.models import EXACT, ScanByScan
+from pidemu.controller.bench import Bench
 from pidemu.errors import ScanError
 from pidemu.records.files import Record
-from pidemu.records.playback import Timing
-from pidemu.records.sampling import Scale, controller_for
+from pidemu.records.sampling import record_from_percent
 from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
 from pidemu.settings.action import Action, acting_alike
 from pidemu.settings.settings import Settings
 
-Floats = npt.NDArray[np.float64]
-
-WIDE: Final = (-1e12, 1e12)
-"""Output limits that no signal of the record reaches [%]."""
 _LINEAR_UNTIL: Final = "large positive error"
 """The first part of the standard record that is meant to reach a limit."""
 _FINEST: Final = 2000
@@ -114,7 +110,7 @@ def emulated(
         raise ScanError(f"a scan interval of {scans[1]:g} s is longer than the whole record, {mine_at[-1]:.6g} s")
     at = np.searchsorted(theirs_at, mine_at + _HAIR * scans[0], side="right") - 1
     actions = acting_alike(target, factor)
-    mine, theirs = (_Bench(s, h, action, in_cascade) for s, h, action in zip((source, target), scans, actions, strict=True))
+    mine, theirs = (_Emulated(s, h, action, in_cascade) for s, h, action in zip((source, target), scans, actions, strict=True))
     ours = REST + abs(factor) * (mine.outputs(record) - REST)
     apart = _apart(ours, theirs.outputs(other)[at])
     exact = bool(np.max(apart) <= EXACT * 100)  # then they agree on the measurement alone as well
@@ -168,23 +164,16 @@ def _apart(ours: Floats, theirs: Floats) -> Floats:
     return apart
 
 
-class _Bench:
-    """A controller that begins every record at rest."""
+class _Emulated:
+    """A controller that begins every record at rest, without output limits."""
 
     def __init__(self, settings: Settings, h: float, action: Action, in_cascade: bool) -> None:
         self._in_cascade = in_cascade
-        self._scale = Scale(settings)
-        self._controller, _ = controller_for(settings, Timing(h), action, WIDE, REST)
-        self._rest: dict[str, float] | None = None
+        self._ranges = settings.own_ranges
+        self._bench = Bench.in_percent(settings, h, sp=REST, pv=REST, op=REST, action=action)
 
     def outputs(self, record: Record) -> Floats:
         """Return the outputs on a record [%]."""
-        own = self._scale.own(record)
-        if self._rest is None:
-            self._controller.rest(float(own.sp[0]), float(own.pv[0]), self._scale.output_own(REST))
-            self._rest = self._controller.state
-        else:  # every record begins at the same rest
-            self._controller.reset()
-            self._controller.start(**self._rest)
+        own = record_from_percent(record, self._ranges)
         remote = own.sp if self._in_cascade else None
-        return self._scale.output_percent(self._controller.run(own.sp, own.pv, cascade=remote))
+        return self._ranges.op.in_percent(self._bench.at_rest().run(own.sp, own.pv, cascade=remote))

@@ -9,15 +9,16 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.certificate.scaled_controller import Side
-from pidemu.certificate.scanwise import WIDE
+from pidemu.arrays import Floats
+from pidemu.certificate.scaled_controller import ScaledController
+from pidemu.controller.bench import Bench
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
-from pidemu.records.files import Floats, Record
-from pidemu.records.playback import Timing
-from pidemu.records.sampling import Scale, controller_for
+from pidemu.records.files import Record
+from pidemu.records.sampling import record_from_percent
 from pidemu.records.standard import LEAST_SCANS, MOST_SCANS, REST, StandardRecord, scale_of, standard_record
 from pidemu.settings.action import Action
+from pidemu.settings.ranges import UNLIMITED, Limits
 
 _MOST_SCANS: Final = 2000
 """The characteristic time is at most this many scans: it is a figure that is wanted, not a plot."""
@@ -36,7 +37,7 @@ Course = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrialPlan:
     """What is tried.
 
     Attributes
@@ -70,12 +71,14 @@ class Plan:
         return sum(self.limits) / 2
 
 
-def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits: tuple[float, float]) -> Plan:
+def planned(
+    both: tuple[ScaledController, ScaledController], time_and_size: tuple[float, float], limits: tuple[float, float]
+) -> TrialPlan:
     """Return what to try: with this time and size, or with another time where that takes too many scans, or too few.
 
     Parameters
     ----------
-    both : tuple of Side
+    both : tuple of ScaledController
         Source and target; the source sets the size that goes with another time.
     time_and_size : tuple of float
         Characteristic time [s] and size [%].
@@ -91,17 +94,17 @@ def planned(both: tuple[Side, Side], time_and_size: tuple[float, float], limits:
     elif time < shortest:
         time, size = scale_of(source, max(scans))
     derivative = max(abs(side.own.kd / side.own.kp) if side.own.kp else abs(side.own.kd) * time for side in both)
-    return Plan(time, size, limits, min(_SLOW * derivative, time / 2))
+    return TrialPlan(time, size, limits, min(_SLOW * derivative, time / 2))
 
 
-class Bench:
+class TriedController:
     """One of the two controllers, to be tried.
 
     Parameters
     ----------
-    side : Side
+    side : ScaledController
         The controller.
-    plan : Plan
+    plan : TrialPlan
         What is tried.
     action : {"reverse", "direct"}
         Control action.
@@ -114,13 +117,13 @@ class Bench:
         It cannot be emulated at this interval.
     """
 
-    def __init__(self, side: Side, plan: Plan, action: Action, span: float) -> None:
+    def __init__(self, side: ScaledController, plan: TrialPlan, action: Action, span: float) -> None:
         if plan.time > _TOO_MANY * side.scan:
             raise ScanError(
                 f"its scan interval of {side.scan:g} s is too short beside the other's; give intervals nearer to each other"
             )
         self._side, self._plan, self._action, self._span = side, plan, action, span
-        self._scale = Scale(side.settings)
+        self._ranges = side.settings.own_ranges
         self._record = _record(side.scan, plan.time, plan.size)
 
     @property
@@ -152,9 +155,9 @@ class Bench:
         if part == STEPS:
             error = self._plan.error * self._softened(times, error / np.max(np.abs(error)))
         pv = REST - self._span * error
-        own = self._scale.own(Record(sp=np.full_like(pv, REST), pv=pv))
-        controller = self._at_rest(start, self._plan.limits if limited else WIDE)
-        outputs = self._scale.output_percent(controller.run(own.sp, own.pv))
+        own = record_from_percent(Record(sp=np.full_like(pv, REST), pv=pv), self._ranges)
+        controller = self._at_rest(start, self._plan.limits if limited else UNLIMITED)
+        outputs = self._ranges.op.in_percent(controller.run(own.sp, own.pv))
         if not np.isfinite(outputs).all():
             raise self._overflow()
         return times, outputs
@@ -178,7 +181,7 @@ class Bench:
             pv=REST + (record.pv - REST) * self._span,
             manual=low + record.manual * ((high - low) / 100),
         )
-        own = self._scale.own(seen)
+        own = record_from_percent(seen, self._ranges)
         assert own.manual is not None
         controller = self._at_rest(self._plan.middle, self._plan.limits)
         controller.run(own.sp[:3], own.pv[:3])
@@ -187,7 +190,8 @@ class Bench:
         by_hand: Floats = np.concatenate((np.array([last]), own.manual[start + 1 : end]))
         moved = controller.run(own.sp[start:end], own.pv[start:end], False, by_hand)
         after = controller.run(own.sp[end : end + 1], own.pv[end : end + 1])
-        bumps = (float(moved[0]) - last) * self._side.op_percent, (float(after[0]) - float(moved[-1])) * self._side.op_percent
+        jumps = float(moved[0]) - last, float(after[0]) - float(moved[-1])
+        bumps = self._ranges.op.change_in_percent(jumps[0]), self._ranges.op.change_in_percent(jumps[1])
         if not all(map(math.isfinite, bumps)):
             raise self._overflow()
         return bumps
@@ -211,11 +215,10 @@ class Bench:
         softened: Floats = np.interp(times, edges, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
         return softened
 
-    def _at_rest(self, start: float, limits: tuple[float, float]) -> Controller:
-        controller, _ = controller_for(self._side.settings, Timing(self._side.scan), self._action, limits, start)
-        rest = float(self._scale.signals_own(np.array(REST)))
-        controller.rest(rest, rest, self._scale.output_own(start))
-        return controller
+    def _at_rest(self, start: float, limits: Limits) -> Controller:
+        side = self._side
+        bench = Bench.in_percent(side.settings, side.scan, sp=REST, pv=REST, op=start, limits=limits, action=self._action)
+        return bench.at_rest()
 
     def _begins(self, name: str) -> int:
         """Return the first sample of a segment."""

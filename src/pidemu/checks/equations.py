@@ -17,6 +17,7 @@ from pidemu.card.model.terms import Derivative, Proportional
 from pidemu.card.references import references
 from pidemu.checks import surroundings as stages
 from pidemu.errors import PidemuError, Problem, UnitError
+from pidemu.settings.ranges import are_limits
 from pidemu.settings.settings import limits, off_values
 from pidemu.units import LEVELS, RATES, Dimension, Role, Unit, check_unit, parse_quantity, parse_unit
 
@@ -45,7 +46,7 @@ _SHORTEST_SCAN: Final = 1e-6
 _LONGEST_SCAN: Final = 1e6
 """Plausible scan intervals [s]."""
 _RATES: Final = ("output-rate", "setpoint-rate")
-_UNLIMITED: Final = (*_RATES, "integral-limit", "windup-limit")
+_OFF_AT_INFINITY: Final = (*_RATES, "integral-limit", "windup-limit")
 """What may be infinite."""
 
 
@@ -75,7 +76,7 @@ def _wrong_in_own_units(equation: Equation, role: Role, unit: Unit) -> Iterator[
             yield "with 'signals: engineering' the gain of a parallel form is in 'eu/eu', as its integral and derivative gains are"
         elif not whole_output and unit.dimension is not Dimension.OP_PER_PV:
             yield "with 'signals: engineering' the gain's unit is 'eu/eu', '%/eu', or for a proportional band 'eu'"
-        elif whole_output and not all(map(math.isfinite, equation.output.limits)):
+        elif whole_output and not are_limits(equation.output.limits):
             yield f"'{unit.name}' refers to the output's range, and 'output.limits' is infinite; give limits, or a gain in 'eu/eu'"
     in_percent = unit.dimension is Dimension.PERCENT_PER_TIME or (role in LEVELS and unit.dimension is Dimension.PERCENT)
     if in_percent and role in (*LEVELS, *RATES):
@@ -107,7 +108,7 @@ def reject_bad_numbers(variant: Variant) -> Iterator[Problem]:
         low, high = limits(s)
         if not low < high:
             yield document.problem((*home, "range"), f"range {low:g} to {high:g} does not ascend")
-        elif s.default is not None and math.isinf(s.default) and s.default not in off_values(s) and s.sets not in _UNLIMITED:
+        elif s.default is not None and math.isinf(s.default) and s.default not in off_values(s) and s.sets not in _OFF_AT_INFINITY:
             yield document.problem((*home, "default"), f"default is infinite, which does not go with the {s.sets}; give a number")
         elif s.default is not None and s.default not in off_values(s) and not low <= s.default <= high:
             yield document.problem(

@@ -14,6 +14,7 @@ from pidemu.card.load import Card, Variant, variants
 from pidemu.card.model.base import Form, Status
 from pidemu.card.model.card_file import Canonical
 from pidemu.card.references import is_active
+from pidemu.controller.bench import Bench
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
 from pidemu.program.builder import build
@@ -76,8 +77,7 @@ def _wrong_gains(card: Card, i: int, settings: Settings, stated: Canonical) -> I
 
 
 def _wrong_outputs(card: Card, i: int, settings: Settings, stated: list[float]) -> Iterator[Problem]:
-    limits = (-1e6, 1e6) if settings.algorithm().arithmetic.type != "integer" else (0.0, 1e4)
-    controller = Controller(settings, output_limits=limits, initial_output=50.0)
+    controller = Bench(settings, None, sp=50.0, pv=50.0, op=50.0).at_rest()
     rest = controller.run(50.0, [50.0] * _AT_REST)[-1]
     for n, value in enumerate(controller.run(51.0, [50.0] * len(stated)) - rest):
         if not math.isclose(stated[n], value, rel_tol=_EXAMPLE_TOLERANCE, abs_tol=1e-6):

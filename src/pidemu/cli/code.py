@@ -10,7 +10,7 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.certificate.unverified import facts, unverified_program
-from pidemu.cli.common import Output, action_option, assignments, echo, limits_option, vendors_option
+from pidemu.cli.common import OutputArgument, action_option, assignments, echo, limits_option, vendors_option
 from pidemu.cli.outputs import inputs
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError
@@ -26,7 +26,7 @@ from pidemu.settings.settings import Settings
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
 @click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
 @click.option("--name", metavar="NAME", help="The name of files, types and functions; by default the card's.")
-@click.option("--out", type=Output("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
+@click.option("--out", type=OutputArgument("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option
 @limits_option

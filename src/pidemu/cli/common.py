@@ -45,7 +45,7 @@ _CELL: Final = 200
 """Characters of a cell of a table on the screen: one that is longer would widen every row."""
 
 
-class Output(_NameType):
+class OutputArgument(_NameType):
     """The name of a file or folder that is written."""
 
     def __init__(self, kind: str = "file") -> None:
@@ -58,7 +58,7 @@ class Output(_NameType):
         return str(value)
 
 
-class Pair(_PairType):
+class PairArgument(_PairType):
     """Two numbers with a comma between, such as ``0,200``."""
 
     name = "LOW,HIGH"
@@ -73,7 +73,7 @@ class Pair(_PairType):
             self.fail(str(error), param, ctx)
 
 
-class Range(_RangeType):
+class RangeArgument(_RangeType):
     """A signal range with its unit, such as ``0,400 degC``."""
 
     name = "LOW,HIGH UNIT"
@@ -86,7 +86,7 @@ class Range(_RangeType):
             self.fail(str(error), param, ctx)
 
 
-class Time(_TimeType):
+class TimeArgument(_TimeType):
     """A time, in seconds or with a unit.
 
     Parameters
@@ -111,7 +111,7 @@ class Time(_TimeType):
             self.fail(str(error), param, ctx)
 
 
-class Step(_StepType):
+class StepArgument(_StepType):
     """The size of a step, or when it comes and its size."""
 
     name = "SIZE|WHEN,SIZE"
@@ -124,7 +124,7 @@ class Step(_StepType):
             self.fail(str(error), param, ctx)
 
 
-class Scan(_StepType):
+class ScanArgument(_StepType):
     """One scan interval, or two with a comma between [s]."""
 
     name = "H[,H2]"
@@ -153,15 +153,15 @@ action_option = click.option(
     show_default=True,
     help="Reverse: the output falls when PV rises.",
 )
-limits_option = click.option("--limits", type=Pair(), help="Output limits; by default the card's.")
+limits_option = click.option("--limits", type=PairArgument(), help="Output limits; by default the card's.")
 setpoint_option = click.option(
     "--setpoint",
-    type=Step(),
+    type=StepArgument(),
     help="Size of the setpoint step [%], or its time [s] and size; by default 10 after a twentieth of the run. 0 for none.",
 )
 load_option = click.option(
     "--load",
-    type=Step(),
+    type=StepArgument(),
     help="Size of the load step at the process input [%], or its time [s] and size; by default 10 after half the run. 0 for none.",
 )
 engine_option = click.option(

@@ -11,7 +11,7 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
-    Output,
+    OutputArgument,
     action_option,
     assignments,
     echo,
@@ -74,10 +74,19 @@ class Scans(_ScansType):
     help="Output before the first scan; by default the first recorded one, else 0; 50 with the standard record.",
 )
 @click.option(
-    "-o", "--output", "target", type=Output(), metavar="FILE.csv", help="Where to write the signals and all outputs, as columns."
+    "-o",
+    "--output",
+    "target",
+    type=OutputArgument(),
+    metavar="FILE.csv",
+    help="Where to write the signals and all outputs, as columns.",
 )
 @click.option(
-    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw the signals, outputs and differences; needs matplotlib."
+    "--plot",
+    "picture",
+    type=OutputArgument(),
+    metavar="FILE.png|svg",
+    help="Draw the signals, outputs and differences; needs matplotlib.",
 )
 @vendors_option
 @json_option

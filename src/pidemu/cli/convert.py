@@ -13,10 +13,10 @@ from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.cli.certificate import print_conversion, print_explanation, print_plan, print_refusal
 from pidemu.cli.common import (
-    Output,
-    Pair,
-    Range,
-    Scan,
+    OutputArgument,
+    PairArgument,
+    RangeArgument,
+    ScanArgument,
     assignments,
     echo,
     json_option,
@@ -68,13 +68,13 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
 @click.option("--loop", "loop_file", metavar="FILE.yaml", help="Read source, settings and target from a file instead.")
 @click.option(
     "--scan",
-    type=Scan(),
+    type=ScanArgument(),
     help="Scan interval that both, or source and target, compute with [s]. (Do not multiply the gain by their ratio: settings "
     "are per second, not per scan.)",
 )
 @click.option(
     "--runs-every",
-    type=Scan(),
+    type=ScanArgument(),
     help="Interval at which the source, or source and target, are really executed, where that is not --scan [s].",
 )
 @click.option("--compensate", is_flag=True, help="With --scan: make up for scan intervals and rules that differ.")
@@ -104,12 +104,14 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     help="Significant digits of dials whose card states no resolution; the certificate is about the rounded ones.",
 )
 @click.option("--bias", type=float, help="Output at SP = PV of a loop without integral action [%].")
-@click.option("--limits", type=Pair(), help="Output limits that the source is set to: the answer states those of the target.")
+@click.option(
+    "--limits", type=PairArgument(), help="Output limits that the source is set to: the answer states those of the target."
+)
 @click.option("--tag", metavar="TAG", default="", help="The loop's name, for the certificate.")
-@click.option("--pv-range", type=Range(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
-@click.option("--op-range", type=Range(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
-@click.option("--to-pv-range", type=Range(), help="Measurement range of the target; by default the source's.")
-@click.option("--to-op-range", type=Range(), help="Output range of the target; by default the source's.")
+@click.option("--pv-range", type=RangeArgument(), help='Measurement range of the source, such as "0,400 degC" or "0,16383 counts".')
+@click.option("--op-range", type=RangeArgument(), help='Output range of the source, such as "0,100 %" or "0,255 pwm".')
+@click.option("--to-pv-range", type=RangeArgument(), help="Measurement range of the target; by default the source's.")
+@click.option("--to-op-range", type=RangeArgument(), help="Output range of the target; by default the source's.")
 @click.option(
     "--cut-over",
     "now",
@@ -129,7 +131,7 @@ def _match(_ctx: click.Context, _option: click.Parameter, text: str | None) -> s
     metavar="YYYY-MM-DD",
     help="Date of the certificate; by default today.",
 )
-@click.option("--html", "page", type=Output(), metavar="FILE.html", help="Write the certificate as a page with plots.")
+@click.option("--html", "page", type=OutputArgument(), metavar="FILE.html", help="Write the certificate as a page with plots.")
 @vendors_option
 @json_option
 def command(

@@ -13,8 +13,8 @@ import click
 
 from pidemu.cli import interrupts
 from pidemu.cli.common import (
-    Output,
-    Time,
+    OutputArgument,
+    TimeArgument,
     asked_for,
     echo,
     engine_option,
@@ -48,7 +48,9 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 @click.command("fleet", short_help="Run a file of closed loops, on all cores or on a cluster.")
 @click.argument("file", metavar="LOOPS.csv")
 @click.option(
-    "--time", type=Time(positive=True), help="Length of the run, for loops that state none; by default until each has settled."
+    "--time",
+    type=TimeArgument(positive=True),
+    help="Length of the run, for loops that state none; by default until each has settled.",
 )
 @setpoint_option
 @load_option
@@ -56,15 +58,15 @@ _MARGINS: Final = ("GM", "PM [deg]", "Ms")
 @click.option("--margins/--no-margins", default=True, help="Compute margins and stability, which takes about as long as the run.")
 @click.option("--cores", type=click.IntRange(min=1), metavar="N", help="Threads on this machine; by default one per core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: its scheduler's address, such as tcp://HOST:8786.")
-@click.option("--table", "target", type=Output(), metavar="FILE.csv", help="Write the table: a row per loop.")
+@click.option("--table", "target", type=OutputArgument(), metavar="FILE.csv", help="Write the table: a row per loop.")
 @click.option(
-    "--signals", type=Output("folder"), metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files."
+    "--signals", type=OutputArgument("folder"), metavar="FOLDER", help="Write measurement and output of every scan, as NumPy files."
 )
-@click.option("--parquet", type=Output(), metavar="FILE", help="Write table and signals as a Parquet file.")
+@click.option("--parquet", type=OutputArgument(), metavar="FILE", help="Write table and signals as a Parquet file.")
 @click.option("--resume", is_flag=True, help="Go on with a run that did not end: with what it left in --signals and --parquet.")
 @click.option(
     "--worker-timeout",
-    type=Time(),
+    type=TimeArgument(),
     default="60 s",
     show_default=True,
     help="How long to wait for a worker where the cluster has none; 0 for ever.",

@@ -11,7 +11,7 @@ from typing import Final
 import click
 
 from pidemu.card.library import card_files
-from pidemu.cli.common import Output, echo, heading, json_option, print_json, table, vendors_option, wrapped
+from pidemu.cli.common import OutputArgument, echo, heading, json_option, print_json, table, vendors_option, wrapped
 from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
 from pidemu.files.writing import beside
@@ -31,9 +31,13 @@ _ALONE: Final = " Verdicts rest on the continuous laws alone."
 @click.command("matrix", short_help="Convert typical settings of every card to every card.")
 @click.argument("cards", nargs=-1, metavar="[CARD]...")
 @click.option(
-    "--csv", "text", type=Output(), metavar="FILE.csv", help="Write one line per conversion, with settings, figures and sentence."
+    "--csv",
+    "text",
+    type=OutputArgument(),
+    metavar="FILE.csv",
+    help="Write one line per conversion, with settings, figures and sentence.",
 )
-@click.option("--html", "page", type=Output(), metavar="FILE.html", help="Write a heat map with all details; needs jinja2.")
+@click.option("--html", "page", type=OutputArgument(), metavar="FILE.html", help="Write a heat map with all details; needs jinja2.")
 @click.option("--no-derivative", "plain", is_flag=True, help="Typical settings without derivative.")
 @click.option("--no-emulation", "laws", is_flag=True, help="Compare the continuous laws alone, in less time.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes that share the work; by default one per processor.")

@@ -11,9 +11,10 @@ from typing import Any
 import click
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.card.library import load_card
 from pidemu.cli.common import (
-    Output,
+    OutputArgument,
     action_option,
     asked_for,
     assignments,
@@ -35,7 +36,7 @@ from pidemu.files.writing import beside
 from pidemu.formatting import json_safe
 from pidemu.plausible import plain_number
 from pidemu.program.ir import StateRole
-from pidemu.records.files import Floats, Record, read_record, write_record
+from pidemu.records.files import Record, read_record, write_record
 from pidemu.records.playback import Playback, Timing, far_out, play, timing
 from pidemu.settings.action import Action
 
@@ -71,13 +72,17 @@ from pidemu.settings.action import Action
     "-o",
     "--output",
     "target",
-    type=Output(),
+    type=OutputArgument(),
     metavar="FILE.csv",
     help="Where to write the record with the new column; by default to the screen.",
 )
 @engine_option
 @click.option(
-    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw setpoint, measurement and outputs; needs matplotlib."
+    "--plot",
+    "picture",
+    type=OutputArgument(),
+    metavar="FILE.png|svg",
+    help="Draw setpoint, measurement and outputs; needs matplotlib.",
 )
 @vendors_option
 @json_option

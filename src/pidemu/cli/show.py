@@ -19,8 +19,8 @@ from pidemu.card.model.base import Evidence
 from pidemu.card.model.card_file import Example, Setting
 from pidemu.card.references import is_active
 from pidemu.cli.common import (
-    Range,
-    Time,
+    RangeArgument,
+    TimeArgument,
     assignments,
     echo,
     heading,
@@ -50,9 +50,9 @@ _COLOUR: Final = {"assumed": "yellow", "inferred": "cyan", "documented": "green"
 @click.command("show", short_help="Show a card as a data sheet; or what its settings mean.")
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
-@click.option("--scan", type=Time(), help="Scan interval [s]: kicks and noise gain at it, too.")
-@click.option("--pv-range", type=Range(), help='Range of the measurement, such as "0,400 degC".')
-@click.option("--op-range", type=Range(), help='Range of the output, such as "0,100 %".')
+@click.option("--scan", type=TimeArgument(), help="Scan interval [s]: kicks and noise gain at it, too.")
+@click.option("--pv-range", type=RangeArgument(), help='Range of the measurement, such as "0,400 degC".')
+@click.option("--op-range", type=RangeArgument(), help='Range of the output, such as "0,100 %".')
 @vendors_option
 @json_option
 def command(

@@ -13,9 +13,9 @@ from pidemu.backends.choice import Choice, checked
 from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.cli.common import (
-    Output,
-    Pair,
-    Time,
+    OutputArgument,
+    PairArgument,
+    TimeArgument,
     asked_for,
     assignments,
     echo,
@@ -75,17 +75,22 @@ _MARGINS: Final = {
 )
 @click.option(
     "--scan",
-    type=Time(),
+    type=TimeArgument(),
     help="Scan interval [s]; by default the card's, or a twentieth of the time in which the loop moves where that is shorter.",
 )
 @setpoint_option
 @load_option
-@click.option("--time", type=Time(), help="Length of the run; by default long enough for both responses to settle.")
+@click.option("--time", type=TimeArgument(), help="Length of the run; by default long enough for both responses to settle.")
 @click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
-@click.option("--limits", type=Pair(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
+@click.option("--limits", type=PairArgument(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
 @engine_option
 @click.option(
-    "-o", "--out", "target", type=Output(), metavar="FILE.csv", help="Write time, setpoint, measurement and output of every scan."
+    "-o",
+    "--out",
+    "target",
+    type=OutputArgument(),
+    metavar="FILE.csv",
+    help="Write time, setpoint, measurement and output of every scan.",
 )
 @vendors_option
 @json_option

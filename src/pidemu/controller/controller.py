@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record
 from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
-from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Floats, Mode, absent, broadcast, mode_of, modes_of, stretches
+from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches
 from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.plausible import INTERVAL, LEVEL, SIGNAL, number, plausible, shown
 from pidemu.program.builder import build
@@ -237,8 +238,7 @@ class Controller:
         sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
-        last = {"sp": float(sp), "pv": float(pv), "auto": 1.0, "manual": nan}
-        self._running.take_over({StateRole.OUTPUT: float(output)}, last)
+        last = self._running.rest(float(sp), float(pv), float(output))
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
 

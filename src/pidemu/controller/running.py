@@ -125,6 +125,12 @@ class Running:
         """Tell whether the program computes something under a name."""
         return any(assign.name == name for assign in self.program.body)
 
+    def rest(self, sp: float, pv: float, output: float) -> dict[str, float]:
+        """Start as if there had been these signals and this output for ever, in automatic; return the signals by name."""
+        signals = {"sp": sp, "pv": pv, "auto": 1.0, "manual": nan}
+        self.take_over({StateRole.OUTPUT: output}, signals)
+        return signals
+
     def take_over(self, old: Mapping[str, float], last: Mapping[str, float]) -> None:
         """Take over the states of the program before, by name.
 

@@ -11,10 +11,10 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Flags, Floats
 from pidemu.errors import ScanError
 
 Mode = Literal["power-up", "manual", "automatic", "cascade", "tracking", "hold"]
-Floats = npt.NDArray[np.float64]
 
 MODES: Final[tuple[Mode, ...]] = ("manual", "automatic", "cascade", "tracking", "hold")
 SIGNALS: Final = {"cascade": "cascade", "track": "track", "external_reset": "reset", "feedforward": "feedforward"}
@@ -80,7 +80,7 @@ def modes_of(signals: Mapping[str, Floats]) -> npt.NDArray[np.int_]:
     return np.where(signals["hold"] > 0, 4, modes)
 
 
-def stretches(modes: npt.NDArray[np.int_], odd: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def stretches(modes: npt.NDArray[np.int_], odd: Flags) -> Iterator[tuple[int, int]]:
     """Yield start and end of every stretch in one mode that is odd, or not, throughout."""
     if modes.size:
         edges = np.flatnonzero((np.diff(modes) != 0) | (np.diff(odd.astype(int)) != 0)) + 1

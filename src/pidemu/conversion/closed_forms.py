@@ -15,7 +15,8 @@ from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.match_method import Match
 from pidemu.conversion.modes import Mode, in_mode, law_in
-from pidemu.conversion.moments import Problem, Way, meet, sizes
+from pidemu.conversion.moments import MomentProblem as Problem
+from pidemu.conversion.moments import Way, meet, sizes
 from pidemu.conversion.target import Numbers, Target, TargetFilter
 from pidemu.errors import SettingError
 from pidemu.law.law import Law

@@ -46,7 +46,6 @@ from pidemu.conversion.target import Target, is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ScanError, SettingError
 from pidemu.law.exact import as_typed
-from pidemu.records.sampling import Scale
 from pidemu.settings.action import Action, switch_position
 from pidemu.settings.ranges import RangeGiven
 from pidemu.settings.settings import Settings, Value, limits
@@ -243,7 +242,7 @@ def _concluded(
     dials: tuple[Rounded, ...] = ()
     if request.digits is not None:
         settings, dials = rounded(settings, request.digits, request.given)
-    stated = None if request.limits is None else Scale(source).limits_percent(request.limits)
+    stated = None if request.limits is None else source.own_ranges.op.limits_in_percent(request.limits)
     certificate = full_certificate(work, settings, unrounded if dials else settings, limits=stated, emulate=emulate)
     if dials:
         certificate = replace(certificate, dials=dials)

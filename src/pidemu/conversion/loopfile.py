@@ -50,7 +50,7 @@ class LoopFile(Model):
 
 
 @dataclass(frozen=True, slots=True)
-class Loop:
+class WrittenLoop:
     """What a loop file says.
 
     Attributes
@@ -80,7 +80,7 @@ class Loop:
     others: Mapping[str, Any] = field(default_factory=dict)
 
 
-def read_loop(file: Path) -> Loop:
+def read_loop(file: Path) -> WrittenLoop:
     """Read a loop file.
 
     Parameters
@@ -113,7 +113,9 @@ def read_loop(file: Path) -> Loop:
         "runs_every": _intervals(loop.runs_every),
     }
     others = {name: value for name, value in given.items() if value is not None}
-    return Loop(loop.card, dict(loop.settings), loop.to, dict(loop.set_), _intervals(loop.scan), loop.process, *ranges, others)
+    return WrittenLoop(
+        loop.card, dict(loop.settings), loop.to, dict(loop.set_), _intervals(loop.scan), loop.process, *ranges, others
+    )
 
 
 def _intervals(given: float | list[float] | None) -> float | tuple[float, float] | None:

@@ -14,8 +14,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.linear import bands
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.target import Numbers, Target
@@ -34,7 +34,7 @@ _POINTS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class MomentProblem:
     """What is wanted of a target.
 
     Attributes
@@ -59,11 +59,11 @@ class Problem:
         return Law(self.target.algorithm_of(self.numbers(moments)), self.scan)
 
 
-Way = Callable[[Problem, Sequence[float]], Sequence[float]]
+Way = Callable[[MomentProblem, Sequence[float]], Sequence[float]]
 """A way to solve: from the problem and the source's moments to moments to ask the closed form with."""
 
 
-def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
+def meet(problem: MomentProblem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
     """Return moments for which the target's law, sampled and held, has the moments of the source's.
 
     A scan rule and a hold change ``m1`` by ``h m0`` and ``m2`` by ``h m1``. What makes up for that is found by Newton's method; the
@@ -72,7 +72,7 @@ def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequen
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     terms : sequence of bool
         Which of integral, proportional and derivative term are at work. The moment of one that is not is neither met nor changed:
@@ -87,9 +87,9 @@ def meet(problem: Problem, terms: Sequence[bool] = (True, True, True)) -> Sequen
     size = np.array(sizes(wanted.tolist()))
     free = np.flatnonzero(terms)
 
-    def missing(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        found: npt.NDArray[np.float64] = np.array(problem.law((x * size).tolist()).held_expansion(3))
-        apart: npt.NDArray[np.float64] = (wanted - found) / size
+    def missing(x: Floats) -> Floats:
+        found: Floats = np.array(problem.law((x * size).tolist()).held_expansion(3))
+        apart: Floats = (wanted - found) / size
         return apart
 
     x = np.where(terms, wanted / size, 0.0)
@@ -118,12 +118,12 @@ def sizes(moments: Sequence[float]) -> tuple[float, float, float]:
     )
 
 
-def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence[float]:
+def at_frequency(problem: MomentProblem, start: Sequence[float], w: float) -> Sequence[float]:
     """Return moments with the source's ``m0`` for which the two responses agree at a frequency.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     start : sequence of float
         The source's moments.
@@ -137,7 +137,7 @@ def at_frequency(problem: Problem, start: Sequence[float], w: float) -> Sequence
     """
     goal = complex(problem.wanted.held(w)[()])
 
-    def apart(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apart(x: Floats) -> Floats:
         ratio = complex(problem.law((start[0], *x)).held(w)[()]) / goal - 1
         return np.array([ratio.real, ratio.imag])
 
@@ -167,7 +167,7 @@ def check_optimiser() -> None:
         raise PidemuError("the match 'loop' needs scipy, which is not installed; pip install 'pidemu[loop]'")
 
 
-def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Sequence[float]:
+def in_loop(problem: MomentProblem, start: Sequence[float], process: Process) -> Sequence[float]:
     """Return moments with the source's ``m0`` for which the loop's response to a load step changes least.
 
     What is minimised is the integral of the squared difference of the two measurements after a load step, computed in the
@@ -175,7 +175,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
 
     Parameters
     ----------
-    problem : Problem
+    problem : MomentProblem
         What is wanted.
     start : sequence of float
         The source's moments.
@@ -199,7 +199,7 @@ def in_loop(problem: Problem, start: Sequence[float], process: Process) -> Seque
     size = np.array(sizes(start)[1:])
     count = 2 if problem.target.has_derivative else 1
 
-    def apart(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apart(x: Floats) -> Floats:
         moments = (start[0], *(x * size[:count]), *start[1 + count :])
         try:
             found = P / (1 + sign * P * problem.law(moments).held(w))

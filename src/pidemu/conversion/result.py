@@ -24,7 +24,6 @@ from pidemu.conversion.request import Request
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
-from pidemu.records.sampling import Scale
 from pidemu.settings.action import ACTIONS, Action, action_line, action_words, carried_action
 from pidemu.settings.settings import Settings
 
@@ -184,8 +183,9 @@ class Conversion:
 
     def _limits(self, limits: tuple[float, float]) -> str:
         """Return what the source's output limits are on the target, in words."""
-        low, high = (number(Scale(self.settings).output_own(x)) for x in Scale(self.source).limits_percent(limits))
-        unit = "%" if self.settings.equation.signals == "percent" else self.settings.own_ranges[1].unit or "output units"
+        old, new = self.source.own_ranges.op, self.settings.own_ranges.op
+        low, high = map(number, new.limits_from_percent(old.limits_in_percent(limits)))
+        unit = "%" if self.settings.equation.signals == "percent" else new.unit or "output units"
         return f"set {low} to {high} {unit}"
 
     @cached_property
@@ -244,13 +244,13 @@ class Conversion:
         SettingError
             One range is of a gauge pressure and the other one of an absolute pressure.
         """
-        from pidemu.cutover.old_signals import as_the_target_shows, in_signal_units
+        from pidemu.cutover.old_signals import as_the_target_shows, limits_in_signal_units
         from pidemu.cutover.plan import transfer_plan
 
         scan = self.scan[1] if self.scan else None
         signals, note = as_the_target_shows(self.source, self.settings, (sp, pv, op))
-        stated = self.request.limits and Scale(self.source).limits_percent(self.request.limits)
-        limits = stated and in_signal_units(stated, self.settings.op_range)
+        stated = self.request.limits and self.source.own_ranges.op.limits_in_percent(self.request.limits)
+        limits = stated and limits_in_signal_units(stated, self.settings.op_range)
         plan = transfer_plan(self.settings, *signals, scan=scan, action=action or self.action, output_limits=limits)
         return replace(plan, notes=(note, *plan.notes)) if note else plan
 

@@ -60,7 +60,7 @@ class Side(Part):
     op_range: Range | None = Field(default=None, description="Output range, where it was given.")
 
 
-class Target(Side):
+class TargetSide(Side):
     """The settings that were found."""
 
     settings: dict[Name, TargetDial] = Field(description="The dials in use, by name.")  # type: ignore[assignment]
@@ -197,7 +197,7 @@ class ConversionPart(Part):
     cards: dict[Name, Sha256] = Field(description="SHA-256 of the file of each card, by id.")
     request: Asked
     source: Side = Field(alias="from")
-    to: Target
+    to: TargetSide
     match: Match
     verdict: Literal["exact", "exact-feedback", "approximate"]
     verdicts: dict[Literal["auto", "cascade", "both"], Literal["exact", "exact-feedback", "approximate"]]

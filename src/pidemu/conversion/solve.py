@@ -20,7 +20,8 @@ from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import NoMatchError
 from pidemu.conversion.match_method import Aim, Match
 from pidemu.conversion.modes import Mode, Modes, law_in, looked_at
-from pidemu.conversion.moments import Problem, Way, at_frequency, in_loop, meet
+from pidemu.conversion.moments import MomentProblem as Problem
+from pidemu.conversion.moments import Way, at_frequency, in_loop, meet
 from pidemu.conversion.nearest import USELESS, nearest
 from pidemu.conversion.target import Numbers, Target
 from pidemu.errors import ScanError, SettingError

@@ -13,14 +13,14 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.card.model.base import Rule
 from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.figures import number
+from pidemu.controller.bench import Bench
 from pidemu.errors import ScanError
-from pidemu.records.files import Floats
-from pidemu.records.playback import Timing
-from pidemu.records.sampling import Scale, controller_for
 from pidemu.settings.action import Action, carried_action, switch_position
+from pidemu.settings.ranges import PERCENT, are_limits
 from pidemu.settings.settings import Settings
 
 STEPS: Final = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
@@ -28,7 +28,6 @@ STEPS: Final = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
 MOST: Final = 30.0
 """The output moves by less than this [% of span], so that it stays off its limits from half way."""
 _MIDDLE: Final = 50.0
-_WIDE: Final = (-1e9, 1e9)
 _DEAD: Final = 1e-7
 """What is left of filters and derivative when they have died out."""
 _INTEGRATOR: Final = 1e-8
@@ -125,14 +124,13 @@ def bench_check(settings: Settings, scan: float | None = None, action: Action | 
 
 def _moved(settings: Settings, h: float, action: Action, step: float) -> _Move:
     """Return what the emulated output does after a step of the measurement [% of span]."""
-    a, scale = settings.algorithm(own_units=True, scan=h), Scale(settings)
+    a, (pv, op) = settings.algorithm(own_units=True, scan=h), settings.own_ranges
     wait = _scans_to_die_out(settings, h)
-    controller, _ = controller_for(settings, Timing(h), switch_position(settings, action), _WIDE, _MIDDLE)
-    low, after = (float(x) for x in scale.signals_own(np.array([_MIDDLE, _MIDDLE + step])))
-    controller.rest(low, low, scale.output_own(_MIDDLE))
+    bench = Bench.in_percent(settings, h, sp=_MIDDLE, pv=_MIDDLE, op=_MIDDLE, action=switch_position(settings, action))
+    controller, low, after = bench.at_rest(), bench.pv, pv.from_percent(_MIDDLE + step)
     watched = min(max(math.ceil(60 / h), 20), _LONGEST)
     still = controller.run(low, np.full(wait, low))[-1]  # P on PV without integral does not rest where it is put
-    u = scale.output_percent(controller.run(low, np.full(wait + watched, after))) - scale.output_percent(np.array(still))
+    u = op.in_percent(controller.run(low, np.full(wait + watched, after))) - op.in_percent(float(still))
     ramp = float(u[-1] - u[wait - 1]) / watched if a.ki or a.dahlin else 0.0
     scans = np.arange(u.size) + _SHARE.get(a.integral.rule, 1.0) - a.measurement.previous_scan
     level = u - ramp * scans
@@ -170,10 +168,10 @@ def _clean(x: float, step: float) -> float:
 
 def _output_span(settings: Settings) -> float:
     """Return what the output can move by [the unit of the figures]: 100, or the card's own limits where no range is given."""
-    low, high = settings.equation.output.limits
-    if settings.equation.signals == "percent" or settings.op_range is not None or not math.isfinite(high - low):
-        return 100.0
-    return high - low if high - low < 1e9 else 100.0
+    low, high = limits = settings.equation.output.limits
+    if settings.equation.signals == "percent" or settings.op_range is not None or not are_limits(limits):
+        return PERCENT.span
+    return high - low
 
 
 def _text(settings: Settings, step: float, move: _Move, known: Action | None, h: float) -> str:
@@ -216,8 +214,8 @@ def _amount(settings: Settings, signal: str, x: float) -> str:
     size = number(abs(x), 4)
     if given is None:
         return f"{size} {'%' if settings.equation.signals == 'percent' else f'{signal.upper()} units'}"
-    own = abs(x) * given.span / 100
-    if given.ends == (0.0, 100.0) and given.unit in ("", "%"):
+    own = given.change_from_percent(abs(x))
+    if given.ends == PERCENT.ends and given.unit in ("", "%"):
         return f"{size} %"
     unit = given.unit or f"{signal.upper()} units"
     return f"{size} % ({number(own, 4)} {unit})"

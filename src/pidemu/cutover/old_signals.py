@@ -8,7 +8,7 @@ from typing import Final
 from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
 from pidemu.settings.range_relation import in_target_units
-from pidemu.settings.ranges import PERCENT, SignalRange
+from pidemu.settings.ranges import PERCENT, Limits, SignalRange, is_limit
 from pidemu.settings.settings import Settings
 
 Signals = tuple[float, float, float]
@@ -53,16 +53,14 @@ def as_the_target_shows(source: Settings, target: Settings, signals: Signals) ->
     return (sp, pv, op), f"on the new controller, {shown}"
 
 
-def in_signal_units(percent: tuple[float, float], given: SignalRange | None) -> tuple[float, float]:
-    """Return two outputs in percent in the units of a range; as they are where none is given."""
-    if given is None:
-        return percent
-    low, high = (given.low + x * given.span / 100 for x in percent)
+def limits_in_signal_units(percent: Limits, given: SignalRange | None) -> Limits:
+    """Return output limits in percent in the units of a range; as they are where none is given."""
+    low, high = (in_target_units(x, PERCENT, given) if is_limit(x) else x for x in percent)
     return low, high
 
 
 def _check(name: str, x: float, given: SignalRange | None) -> None:
-    part = x if given is None else 100 * (x - given.low) / given.span
+    part = round(x if given is None else given.in_percent(x), 9)
     if not -_BEYOND <= part <= 100 + _BEYOND:
         raise ScanError(
             f"the {name} {_text(x, given)} is outside the old controller's range, {given or PERCENT}; give the signals at the "

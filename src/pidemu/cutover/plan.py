@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pidemu.cutover.bench import Bench, bench_for
 from pidemu.cutover.notes import notes
-from pidemu.cutover.steps import Step, steps
+from pidemu.cutover.steps import CutoverStep, steps
+from pidemu.cutover.takeover import Takeover, takeover_of
 from pidemu.cutover.trials import NO_BUMP, cut_over, resolution
 from pidemu.cutover.ways import best_way, simple_way
 from pidemu.errors import ActionError, ScanError
@@ -22,7 +22,7 @@ class TransferPlan:
 
     Attributes
     ----------
-    steps : tuple of Step
+    steps : tuple of CutoverStep
         What to do.
     bump : float
         What the output moves by in the first automatic scan where the plan is followed, by emulation [% of output span]. The
@@ -41,7 +41,7 @@ class TransferPlan:
         What the plan rests on, and what cannot be avoided and why.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[CutoverStep, ...]
     bump: float
     without_plan: float
     notes: tuple[str, ...]
@@ -123,8 +123,9 @@ def transfer_plan(
     if contradiction := check_action(target, action):
         raise ScanError(contradiction)
     if stated is not None:
-        return _plan(bench_for(target, (sp, pv, op), scan, stated, output_limits))
-    either, direct = (_plan(replace(bench_for(target, (sp, pv, op), scan, a, output_limits), action_known=False)) for a in ACTIONS)
+        return _plan(takeover_of(target, (sp, pv, op), scan, stated, output_limits))
+    both = (takeover_of(target, (sp, pv, op), scan, a, output_limits) for a in ACTIONS)
+    either, direct = (_plan(replace(new, action_known=False)) for new in both)
     if not _same(either, direct):
         raise ActionError(
             f"{target.card.id}: what to set at this cut-over depends on the action of the loop, which was not stated; add --action "
@@ -140,17 +141,17 @@ def _same(one: TransferPlan, other: TransferPlan) -> bool:
     return (one.steps, one.notes) == (other.steps, other.notes) and all(abs(x - y) <= near for x, y in moves)
 
 
-def _plan(bench: Bench) -> TransferPlan:
+def _plan(new: Takeover) -> TransferPlan:
     """Return the plan for one action."""
-    way, cut = best_way(bench)
-    bare = cut_over(bench, simple_way(bench))
-    known = bench.action_known
+    way, cut = best_way(new)
+    bare = cut_over(new, simple_way(new))
+    known = new.action_known
     return TransferPlan(
-        steps=tuple(steps(bench, way, cut)),
-        bump=bench.out.percent(cut.bump) + 0.0,
-        without_plan=bench.out.percent(bare.bump) + 0.0,
-        notes=tuple(notes(bench, way, cut)),
-        resolution=resolution(bench, cut),
-        action=bench.action if known else None,
-        action_text=action_words(bench.settings, bench.action) if known else f"either action ({action_line(bench.settings)})",
+        steps=tuple(steps(new, way, cut)),
+        bump=new.out.percent(cut.bump) + 0.0,
+        without_plan=new.out.percent(bare.bump) + 0.0,
+        notes=tuple(notes(new, way, cut)),
+        resolution=resolution(new, cut),
+        action=new.action if known else None,
+        action_text=action_words(new.settings, new.action) if known else f"either action ({action_line(new.settings)})",
     )

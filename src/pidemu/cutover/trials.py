@@ -12,14 +12,14 @@ from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
 from pidemu.controller.controller import Controller
 from pidemu.controller.running import Running
-from pidemu.cutover.bench import Bench
+from pidemu.cutover.takeover import Takeover
 from pidemu.program.ir import DERIVATIVE_STATES, StateRole
+from pidemu.settings.ranges import UNLIMITED
 
 NO_BUMP: Final = 1e-9
 """Moves of the output below this [% of span] are rounding in float64."""
 LONGEST: Final = 2**18
 """Scans after which filters that have not settled are left alone."""
-_UNLIMITED: Final = (-1e30, 1e30)
 _RESTLESS: Final = frozenset(
     {
         StateRole.INTEGRAL,
@@ -85,48 +85,48 @@ class Cut:
     kick: float
 
 
-def cut_over(bench: Bench, way: Way) -> Cut:
+def cut_over(new: Takeover, way: Way) -> Cut:
     """Emulate a way: the first automatic scan, and the next with the setpoint given back."""
-    ctl, waited = before(bench, way)
-    p = 0.0 if bench.increments else proportional(ctl, bench, way.sp)
-    at_once = _integrates_at_once(bench.a, ctl.state)
-    increment = _increment(bench, way)
-    u = ctl.scan(way.sp, bench.pv)
-    cut = Cut(u - bench.op, increment, p, waited, ctl.scan(bench.sp, bench.pv) - u)
-    if is_none(bench, cut):  # nothing was integrated, as at a limit
+    ctl, waited = before(new, way)
+    p = 0.0 if new.increments else proportional(ctl, new, way.sp)
+    at_once = _integrates_at_once(new.a, ctl.state)
+    increment = _increment(new, way)
+    u = ctl.scan(way.sp, new.pv)
+    cut = Cut(u - new.op, increment, p, waited, ctl.scan(new.sp, new.pv) - u)
+    if is_none(new, cut):  # nothing was integrated, as at a limit
         return cut
-    return replace(cut, bump=u - min(max(bench.op + at_once * increment, bench.limits[0]), bench.limits[1]))
+    return replace(cut, bump=u - min(max(new.op + at_once * increment, new.limits[0]), new.limits[1]))
 
 
-def resolution(bench: Bench, cut: Cut) -> float:
+def resolution(new: Takeover, cut: Cut) -> float:
     """Return the rounding of the arithmetic [% of output span] (specs/equations.md, section 7)."""
-    a = bench.a
-    size = abs(bench.op) + 2 * abs(cut.proportional) + abs(cut.increment)
+    a = new.a
+    size = abs(new.op) + 2 * abs(cut.proportional) + abs(cut.increment)
     part = {"float64": 1e-14, "float32": 2.0**-21, "integer": 0.0}[a.arithmetic.type]  # some operations, half a bit each
     step = (a.output.resolution or 0.0) + (1 / (a.arithmetic.counts or 1) if a.arithmetic.type == "integer" else 0.0)
-    return max(NO_BUMP, bench.out.percent(part * size + step))
+    return max(NO_BUMP, new.out.percent(part * size + step))
 
 
-def is_none(bench: Bench, cut: Cut) -> bool:
+def is_none(new: Takeover, cut: Cut) -> bool:
     """Tell whether a bump is none."""
-    return bench.out.percent(abs(cut.bump)) <= resolution(bench, cut)
+    return new.out.percent(abs(cut.bump)) <= resolution(new, cut)
 
 
-def before(bench: Bench, way: Way) -> tuple[Controller, int | None]:
+def before(new: Takeover, way: Way) -> tuple[Controller, int | None]:
     """Return the controller just before its first automatic scan, and how many scans it has been waiting."""
-    ctl = bench.controller(way.bias)
+    ctl = new.controller(way.bias)
     if not way.waits:
         return ctl, 0
-    entry = bench.op if way.entry is None else way.entry
+    entry = new.op if way.entry is None else way.entry
     if way.prepared:
-        ctl.scan(bench.measured.other_than(way.sp), bench.pv, auto=False, manual=entry)
-    waited = _settle(ctl, way.sp, bench.pv, entry)
+        ctl.scan(new.measured.other_than(way.sp), new.pv, auto=False, manual=entry)
+    waited = _settle(ctl, way.sp, new.pv, entry)
     preset: dict[str, float] = {} if way.load is None else {StateRole.OUTPUT: way.load}
     if way.integral is not None:
-        preset = _preset(bench, ctl.state, way.integral)
+        preset = _preset(new, ctl.state, way.integral)
     if preset:
         states = ctl.state | preset
-        ctl = bench.controller(way.bias)
+        ctl = new.controller(way.bias)
         ctl.start(**states)
     return ctl, waited
 
@@ -139,28 +139,28 @@ def factors(a: Algorithm, ctl: Controller) -> tuple[float, float]:
     return numbers["kp"], numbers.get("Ti", 1.0) if a.integral.holds == "e" else 1.0
 
 
-def term(ctl: Controller, bench: Bench, sp: float) -> float:
+def term(ctl: Controller, new: Takeover, sp: float) -> float:
     """Return what the program will compute as proportional term in its next scan, before a gain on the whole sum."""
-    running = Running(lambda _h: bench.a, lambda _a, _h: ctl.program, ctl.interval)
+    running = Running(lambda _h: new.a, lambda _a, _h: ctl.program, ctl.interval)
     if not running.computes("P"):
         return 0.0
     for name, value in ctl.state.items():
         running[name] = value
-    return running.would_be({"sp": sp, "pv": bench.pv, "auto": 1.0}, "P")
+    return running.would_be({"sp": sp, "pv": new.pv, "auto": 1.0}, "P")
 
 
-def proportional(ctl: Controller, bench: Bench, sp: float) -> float:
+def proportional(ctl: Controller, new: Takeover, sp: float) -> float:
     """Return what the next scan's proportional term adds to the output [own output units]."""
-    return factors(bench.a, ctl)[0] * term(ctl, bench, sp)
+    return factors(new.a, ctl)[0] * term(ctl, new, sp)
 
 
-def _preset(bench: Bench, state: Mapping[str, float], integral: float) -> dict[str, float]:
+def _preset(new: Takeover, state: Mapping[str, float], integral: float) -> dict[str, float]:
     """Return the states that go with an integral that is set: what the algorithm knows of its output is the output."""
-    preset: dict[str, float] = {name: bench.op for name in (StateRole.OWN_OUTPUT, StateRole.INNER_SUM) if name in state}
+    preset: dict[str, float] = {name: new.op for name in (StateRole.OWN_OUTPUT, StateRole.INNER_SUM) if name in state}
     preset[StateRole.INTEGRAL] = integral
-    if bench.a.transfer.way.clears:  # set after the transfer has cleared it, and the derivative with it
+    if new.a.transfer.way.clears:  # set after the transfer has cleared it, and the derivative with it
         preset |= {StateRole.MODE: 1.0}
-        if bench.a.transfer.derivative == "zeroed":
+        if new.a.transfer.derivative == "zeroed":
             preset |= {name: 0.0 for name in DERIVATIVE_STATES if name in state}
     return preset
 
@@ -199,14 +199,14 @@ def _integrates_at_once(a: Algorithm, state: Mapping[str, float]) -> float:
     )
 
 
-def _increment(bench: Bench, way: Way) -> float:
+def _increment(new: Takeover, way: Way) -> float:
     """Return what the integral adds per scan away from all limits [own output units]."""
-    if not bench.a.ki or bench.increments:
+    if not new.a.ki or new.increments:
         return 0.0
-    ctl, _ = before(replace(bench, limits=_UNLIMITED), way)
+    ctl, _ = before(replace(new, limits=UNLIMITED), way)
     states = []
     for _ in range(3):  # the first may be a transfer
-        ctl.scan(way.sp, bench.pv)
+        ctl.scan(way.sp, new.pv)
         states.append(ctl.state[StateRole.INTEGRAL])
-    gain, time = factors(bench.a, ctl)
+    gain, time = factors(new.a, ctl)
     return gain * (states[2] - states[1]) / time

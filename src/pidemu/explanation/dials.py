@@ -7,17 +7,17 @@ from typing import Final
 
 from pidemu.card.model.base import Form
 from pidemu.certificate.figures import number
-from pidemu.explanation.model import Dial
+from pidemu.explanation.model import DialFacts
 from pidemu.settings.settings import Settings, Value
 from pidemu.units import Dimension, Role, parse_unit
 
 _PER_REPEAT: Final = ("s/repeat", "min/repeat", "repeat/min")
 
 
-def dials_of(settings: Settings) -> tuple[Dial, ...]:
+def dials_of(settings: Settings) -> tuple[DialFacts, ...]:
     """Return the dials that the options use, each in other usual units too."""
     return tuple(
-        Dial(name, v.value, v.unit, {unit: v.to(unit) for unit in _others(settings, v)}, v.given, v.off)
+        DialFacts(name, v.value, v.unit, {unit: v.to(unit) for unit in _others(settings, v)}, v.given, v.off)
         for name, v in settings.items()
         if v.active
     )

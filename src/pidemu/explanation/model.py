@@ -13,7 +13,7 @@ from pidemu.formatting import json_safe
 
 
 @dataclass(frozen=True, slots=True)
-class Dial:
+class DialFacts:
     """One dial as given.
 
     Attributes
@@ -100,7 +100,7 @@ class Explanation:
         Scan interval [s]; ``None`` where none was given.
     gain_unit : str
         ``"%/%"``, or ``"output units per PV unit"`` for a card that computes in engineering units whose ranges were not given.
-    dials : tuple of Dial
+    dials : tuple of DialFacts
         The dials that these options use.
     kind : str
         ``"PID"``, ``"PI"``, ``"P"``, ``"I"`` and so on; ``"pole cancellation"``; ``"none"`` where all gains are zero.
@@ -136,7 +136,7 @@ class Explanation:
     options: Mapping[str, str]
     scan: float | None
     gain_unit: str
-    dials: tuple[Dial, ...]
+    dials: tuple[DialFacts, ...]
     kind: str
     forms: Forms | None
     filters: tuple[FilterFacts, ...]

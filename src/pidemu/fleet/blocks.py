@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice
 from pidemu.backends.runner import Block
 from pidemu.fleet.prepare import Prepared
@@ -18,7 +18,6 @@ from pidemu.simulation.outcome import late_scan
 from pidemu.simulation.simulate import run_trial
 from pidemu.simulation.trial import Trial
 
-Floats = npt.NDArray[np.float64]
 Room = Callable[[tuple[int, int, int]], Floats]
 """From the shape of a block's records to the array that takes them."""
 
@@ -29,7 +28,7 @@ _IN_CACHE: Final = 2**15
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BlockOutcome:
     """What came of a block of loops.
 
     Attributes
@@ -67,7 +66,7 @@ def run_block(
     width: int,
     room: Room | None,
     stop: Callable[[], bool],
-) -> Outcome:
+) -> BlockOutcome:
     """Run loops of a group side by side, until the last of them is done.
 
     Parameters
@@ -115,7 +114,7 @@ def run_block(
             columns[:, done] = states[places, done]
             done += 1
     found = dict(zip(COLUMNS, columns, strict=True))
-    return Outcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
+    return BlockOutcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
 
 
 def _spans(ends: Sequence[int], at_once: int) -> Iterator[tuple[int, int]]:

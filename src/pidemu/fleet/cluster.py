@@ -15,9 +15,9 @@ import numpy as np
 
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.local import outcomes
-from pidemu.fleet.loops import Loop, Plan
+from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.prepare import Failed
 
 _FIRST: Final = 64
@@ -38,7 +38,9 @@ _LOOK: Final = 1.0
 Numbered = tuple[int, Loop]
 
 
-def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan, worker_timeout: float) -> Generator[Outcome | Failed]:
+def outcomes_on(
+    cluster: Any, loops: Iterable[Numbered], plan: FleetPlan, worker_timeout: float
+) -> Generator[BlockOutcome | Failed]:
     """Run loops on a cluster, and yield what comes of them as it is done.
 
     The numbers are those of one machine: a loop's do not depend on the loops beside it. Chunks of a worker that is lost are run
@@ -50,7 +52,7 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan, worker_time
         Where to run: the scheduler's address, a client, or a cluster such as ``distributed.LocalCluster``.
     loops : iterable of (int, Loop)
         Loops with their places in the fleet.
-    plan : Plan
+    plan : FleetPlan
         What is done to them.
     worker_timeout : float
         How long to wait where there is no worker [s]; 0 for ever.
@@ -68,7 +70,7 @@ def outcomes_on(cluster: Any, loops: Iterable[Numbered], plan: Plan, worker_time
 class _Chunks:
     """Chunks of loops: as many under way as keep all threads of the cluster busy, each of some seconds."""
 
-    def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: Plan, worker_timeout: float) -> None:
+    def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: FleetPlan, worker_timeout: float) -> None:
         self._distributed, self._client, self._plan = distributed, client, plan
         self._loops, self._size = iter(loops), _FIRST
         self._under_way: dict[Any, list[Numbered]] = {}
@@ -77,7 +79,7 @@ class _Chunks:
         self._alone: set[int] = set()
         self._workers = _Workers(client, worker_timeout)
 
-    def outcomes(self) -> Iterator[Outcome | Failed]:
+    def outcomes(self) -> Iterator[BlockOutcome | Failed]:
         """Yield what comes of the loops."""
         done = self._distributed.as_completed(self._submitted(), loop=self._client.loop)
         try:
@@ -176,14 +178,14 @@ def _address(client: Any) -> str:
     return str(client.scheduler.address) if client.scheduler is not None else "the cluster"
 
 
-def run_chunk(chunk: Sequence[Numbered], plan: Plan) -> tuple[list[Outcome | Failed], float]:
+def run_chunk(chunk: Sequence[Numbered], plan: FleetPlan) -> tuple[list[BlockOutcome | Failed], float]:
     """Run loops on a worker; return what came of them, and how long it took [s].
 
     Parameters
     ----------
     chunk : sequence of (int, Loop)
         Loops with their places in the fleet.
-    plan : Plan
+    plan : FleetPlan
         What is done to them.
     """
     start = time.perf_counter()
@@ -191,14 +193,14 @@ def run_chunk(chunk: Sequence[Numbered], plan: Plan) -> tuple[list[Outcome | Fai
     return found, time.perf_counter() - start
 
 
-def _light(one: Outcome | Failed) -> Outcome | Failed:
+def _light(one: BlockOutcome | Failed) -> BlockOutcome | Failed:
     """Return what is sent back: the trials and what came of them, without the programs' numbers."""
     if isinstance(one, Failed):
         return one
     return replace(one, members=tuple(replace(m, structure=None, values=(), initial=()) for m in one.members))  # type: ignore[arg-type]
 
 
-Taken = tuple[list[Outcome | Failed], float]
+Taken = tuple[list[BlockOutcome | Failed], float]
 
 
 def _taken(future: Any) -> Taken | Exception:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from pidemu import __version__
-from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.judgement import MARGINS, RAN, Judgement, judgement
-from pidemu.fleet.loops import Loop, Plan
+from pidemu.fleet.loops import FleetPlan, Loop
 
 FIELDS: Final = ("scan", "scans", "status", *COLUMNS, "settled", "stable", *MARGINS, "engine", "key")
 """What is written of a loop beside its tag."""
@@ -64,12 +64,12 @@ class Finished:
         }
 
 
-def finished(outcome: Outcome, known: Sequence[str]) -> list[Finished]:
+def finished(outcome: BlockOutcome, known: Sequence[str]) -> list[Finished]:
     """Return the rows of a block.
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome : BlockOutcome
         What came of it.
     known : sequence of str
         The key of every loop of the fleet.
@@ -117,21 +117,21 @@ def read_row(tag: str, row: Mapping[str, Any]) -> Finished:
 _LENGTH: Final = 32
 
 
-def keys(loops: Iterable[Loop], plan: Plan) -> list[str]:
+def keys(loops: Iterable[Loop], plan: FleetPlan) -> list[str]:
     """Return a hash per loop of all that its numbers depend on: card and settings, process, scan, steps, time and pidemu itself.
 
     Parameters
     ----------
     loops : iterable of Loop
         The loops.
-    plan : Plan
+    plan : FleetPlan
         What is done to them. The engine does not count, as all give the same bits.
     """
     equations: dict[int, str] = {}  # many loops share a variant of a card, which lives as long as they do
     return [_key(loop, plan, equations) for loop in loops]
 
 
-def _key(loop: Loop, plan: Plan, equations: dict[int, str]) -> str:
+def _key(loop: Loop, plan: FleetPlan, equations: dict[int, str]) -> str:
     settings, process = loop.settings, loop.process
     variant = settings.variant
     if id(variant) not in equations:

@@ -10,10 +10,10 @@ from typing import Any
 
 from pidemu.backends.choice import Engine, checked
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import keys
 from pidemu.fleet.local import outcomes
-from pidemu.fleet.loops import Loop, Plan, unique
+from pidemu.fleet.loops import FleetPlan, Loop, unique
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import FleetResult
@@ -119,7 +119,7 @@ class Fleet:
             raise FleetError(f"{cores} cores cannot run anything; give at least 1")
         result = FleetResult(self.loops)
         keeps = keep or folder is not None or parquet is not None
-        plan = Plan(setpoint, load, time, keeps, checked(engine), margins)
+        plan = FleetPlan(setpoint, load, time, keeps, checked(engine), margins)
         try:
             with contextlib.ExitStack() as stack:
                 store = stack.enter_context(SignalStore(keep, folder, parquet, resume)) if keeps or resume else None
@@ -133,7 +133,7 @@ class Fleet:
             result.interrupted = True
         return result
 
-    def _left(self, result: FleetResult, plan: Plan, store: SignalStore | None) -> list[tuple[int, Loop]]:
+    def _left(self, result: FleetResult, plan: FleetPlan, store: SignalStore | None) -> list[tuple[int, Loop]]:
         """Return the loops that are to be run, with their places; the result takes those that an earlier run had done."""
         done: set[int] = set()
         if store is not None:
@@ -143,8 +143,14 @@ class Fleet:
         return [(place, loop) for place, loop in enumerate(self.loops) if place not in done]
 
     def _outcomes(
-        self, loops: list[tuple[int, Loop]], plan: Plan, cores: int | None, cluster: Any, patience: float, store: SignalStore | None
-    ) -> Generator[Outcome | Failed]:
+        self,
+        loops: list[tuple[int, Loop]],
+        plan: FleetPlan,
+        cores: int | None,
+        cluster: Any,
+        patience: float,
+        store: SignalStore | None,
+    ) -> Generator[BlockOutcome | Failed]:
         if cluster is None:
             return outcomes(loops, plan, cores=cores, room=None if store is None else store.room)
         from pidemu.fleet.cluster import outcomes_on

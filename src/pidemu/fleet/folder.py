@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FleetError
 from pidemu.files.tables import text_cell, write_rows
 from pidemu.files.writing import beside
@@ -24,7 +24,6 @@ from pidemu.fleet.finished import FIELDS, Finished, read_row
 from pidemu.fleet.lock import FolderLock
 from pidemu.fleet.writing import End, after, writing
 
-Floats = npt.NDArray[np.float64]
 INDEX: Final = "signals.csv"
 """The file of a folder that says where the signals of each loop are, and what came of it."""
 _HEADER: Final = ("tag", "file", "loop", "sha256", *FIELDS)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.simulation.outcome import has_settled, stability_of
 
 Status = Literal["done", "unstable", "ran away", "failed", "not run"]
@@ -38,12 +38,12 @@ class Judgement:
     margins: Mapping[str, float]
 
 
-def judgement(found: Outcome, lane: int) -> Judgement:
+def judgement(found: BlockOutcome, lane: int) -> Judgement:
     """Return how a loop of a block ended.
 
     Parameters
     ----------
-    found : Outcome
+    found : BlockOutcome
         What came of the block.
     lane : int
         The loop's number in it.

@@ -13,8 +13,8 @@ from typing import Any, Final
 from pidemu.backends.choice import Choice, block, for_loops, instead, one_by_one
 from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import Outcome, Room, Stopped, run_block
-from pidemu.fleet.loops import Loop, Plan
+from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block
+from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared, reason_of
 from pidemu.program.ir import Structure
 
@@ -37,8 +37,8 @@ def cores_here() -> int:
 
 
 def outcomes(
-    loops: Iterable[tuple[int, Loop]], plan: Plan, *, cores: int | None = None, room: Room | None = None
-) -> Generator[Outcome | Failed]:
+    loops: Iterable[tuple[int, Loop]], plan: FleetPlan, *, cores: int | None = None, room: Room | None = None
+) -> Generator[BlockOutcome | Failed]:
     """Run loops, and yield what comes of them, block by block, as it is done.
 
     While threads run blocks, the next loops are prepared. Where the iterator is closed or interrupted, blocks under way stop.
@@ -47,7 +47,7 @@ def outcomes(
     ----------
     loops : iterable of (int, Loop)
         Loops with their places in the fleet.
-    plan : Plan
+    plan : FleetPlan
         What is done to them.
     cores : int, optional
         Threads; by default all cores.
@@ -79,12 +79,12 @@ def outcomes(
 class _Threads:
     """Threads that run blocks. Where signals are kept, they wait while many blocks are done that nobody has taken yet."""
 
-    def __init__(self, count: int, plan: Plan, room: Room | None) -> None:
+    def __init__(self, count: int, plan: FleetPlan, room: Room | None) -> None:
         self._plan, self._room = plan, room
         self._stop = threading.Event()
         self._free = None if room is None else threading.Semaphore(2 * count)
         self._pool = ThreadPoolExecutor(count, thread_name_prefix="fleet")
-        self._done: queue.SimpleQueue[Future[list[Outcome | Failed]]] = queue.SimpleQueue()
+        self._done: queue.SimpleQueue[Future[list[BlockOutcome | Failed]]] = queue.SimpleQueue()
         self._left = 0
 
     def start(self, group: Group) -> None:
@@ -107,7 +107,7 @@ class _Threads:
             choice = instead(asked or "numba", error)
             return choice, *block(group.structure, choice.engine)
 
-    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> list[Outcome | Failed]:
+    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> list[BlockOutcome | Failed]:
         if self._free is not None:
             self._free.acquire()
         try:
@@ -119,7 +119,7 @@ class _Threads:
                 return [Failed(part[0].place, reason_of(error))]
             return [self._alone(member, instead(choice.engine, error)) for member in part]
 
-    def _alone(self, member: Prepared, choice: Choice) -> Outcome | Failed:
+    def _alone(self, member: Prepared, choice: Choice) -> BlockOutcome | Failed:
         """Run a loop of a block that failed, in plain Python: what was wrong with one of them is no matter to the others."""
         function = _in_turn(one_by_one(member.structure, choice.engine))
         try:
@@ -129,7 +129,7 @@ class _Threads:
         except Exception as error:
             return Failed(member.place, reason_of(error))
 
-    def done(self, most: int | None = None) -> Iterator[Outcome | Failed]:
+    def done(self, most: int | None = None) -> Iterator[BlockOutcome | Failed]:
         """Yield what is done; wait until at most so many blocks are left, or not at all."""
         while self._left:
             waits = most is not None and self._left > most

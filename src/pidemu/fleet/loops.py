@@ -52,7 +52,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FleetPlan:
     """What is done to every loop of a fleet that does not say otherwise.
 
     Attributes

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from pidemu.errors import FleetError
 from pidemu.files.writing import UNFINISHED, beside, check
-from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.finished import FIELDS, Finished, read_row
 from pidemu.fleet.judgement import MARGINS
 from pidemu.fleet.lock import FolderLock
@@ -127,7 +127,7 @@ class ParquetFile:
         self._taken = [(path, own & tags) for path, own in self._taken]
         self._begun = True
 
-    def add(self, outcome: Outcome, rows: Sequence[Finished]) -> None:
+    def add(self, outcome: BlockOutcome, rows: Sequence[Finished]) -> None:
         """Write a block.
 
         Raises

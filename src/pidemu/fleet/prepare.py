@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.errors import PidemuError
-from pidemu.fleet.loops import Loop, Plan
+from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.program.ir import Program, Structure
 from pidemu.simulation.experiment import Measuring, Steps, experiment
 from pidemu.simulation.outcome import late_scan, margins_if_any
@@ -102,14 +102,14 @@ class Group:
         yield self.members[start:]
 
 
-def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan, shared: dict[Structure, Structure]) -> list[Prepared | Failed]:
+def prepared(loops: Iterable[tuple[int, Loop]], plan: FleetPlan, shared: dict[Structure, Structure]) -> list[Prepared | Failed]:
     """Return each loop as a program, or why it cannot be run.
 
     Parameters
     ----------
     loops : iterable of (int, Loop)
         Loops with their places in the fleet.
-    plan : Plan
+    plan : FleetPlan
         What is done to them.
     shared : dict
         Structures that there are already; new ones are added, so that like loops share theirs.
@@ -118,7 +118,7 @@ def prepared(loops: Iterable[tuple[int, Loop]], plan: Plan, shared: dict[Structu
         return [_prepared(place, loop, plan, shared) for place, loop in loops]
 
 
-def _prepared(place: int, loop: Loop, plan: Plan, shared: dict[Structure, Structure]) -> Prepared | Failed:
+def _prepared(place: int, loop: Loop, plan: FleetPlan, shared: dict[Structure, Structure]) -> Prepared | Failed:
     try:
         trial = plan.trial(loop)
         program = measured(trial)

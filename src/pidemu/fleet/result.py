@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FleetError, suggest
 from pidemu.files.tables import write_table
-from pidemu.fleet.blocks import COLUMNS, Outcome
+from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.finished import Finished
 from pidemu.fleet.folder import Place
 from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
@@ -22,13 +22,12 @@ from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import Failed
 from pidemu.simulation.trial import Trial
 
-Floats = npt.NDArray[np.float64]
 HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "settled", "stable", *MARGINS, "engine", "reason")
 """Columns of the table. Times are in seconds, signals in percent."""
 
 
 @dataclass(frozen=True)
-class Signals:
+class LoopSignals:
     """The signals of one loop.
 
     Attributes
@@ -93,7 +92,7 @@ class FleetResult:
         self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
         self._signals: dict[int, tuple[Callable[[], Trial], Floats | Path, int]] = {}
 
-    def add(self, found: Outcome | Failed) -> int:
+    def add(self, found: BlockOutcome | Failed) -> int:
         """Take what came of a block, or of a loop that failed; return how many loops that is."""
         if isinstance(found, Failed):
             self.status[found.place], self.reasons[found.place] = "failed", found.reason
@@ -151,7 +150,7 @@ class FleetResult:
     def __len__(self) -> int:
         return len(self.loops)
 
-    def __getitem__(self, tag: str) -> Signals:
+    def __getitem__(self, tag: str) -> LoopSignals:
         """Return the signals of a loop.
 
         Raises
@@ -173,7 +172,7 @@ class FleetResult:
         trial = made()
         records = np.load(kept, mmap_mode="r") if isinstance(kept, Path) else kept
         out, pv = np.array(records[:, : trial.scans, lane])
-        return Signals(trial.times, trial.setpoint, pv, out)
+        return LoopSignals(trial.times, trial.setpoint, pv, out)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""

@@ -10,11 +10,11 @@ from types import TracebackType
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
-from pidemu.fleet.blocks import Outcome
+from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import Finished, finished
 from pidemu.fleet.folder import Place, SignalFolder
 from pidemu.fleet.parquet import ParquetFile
@@ -22,7 +22,6 @@ from pidemu.fleet.writing import End, refuse_overlap
 
 _FAULTS: Final = 5
 """Damaged files that are named; there may be thousands."""
-Floats = npt.NDArray[np.float64]
 
 
 class SignalStore:
@@ -108,7 +107,7 @@ class SignalStore:
         """
         return np.empty(shape) if self._folder is None else self._folder.room(shape)
 
-    def stored(self, outcome: Outcome) -> Outcome:
+    def stored(self, outcome: BlockOutcome) -> BlockOutcome:
         """Write the records of a block, and return the outcome with them, or with the file, where they are kept.
 
         Raises

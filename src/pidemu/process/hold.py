@@ -22,12 +22,12 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial
 
+from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Response
 from pidemu.process.roots import polynomial_of
 from pidemu.program.blocks import TINY
 
-Floats = npt.NDArray[np.float64]
 _TERMS: Final = 18
 """Terms of the series of ``exp(X) - 1`` for a norm of X up to 1/2: the next one is below 1e-22."""
 _WHOLE: Final = 1e-9

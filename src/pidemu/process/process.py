@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Rational, Response
 from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
@@ -22,7 +23,6 @@ from pidemu.process.hold import SampledProcess, sample
 from pidemu.process.roots import count, factors, in_pairs, joined, poles_of, polynomial_of, zeros_of
 from pidemu.process.text import read
 
-Floats = npt.NDArray[np.float64]
 _DECADES: Final = 6
 """How far beyond the process's own frequencies a phase of -180 degrees is looked for."""
 

@@ -8,17 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from pidemu.arrays import Floats
 from pidemu.card.model.card_file import default_scan
+from pidemu.controller.bench import limits_in_percent
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
-from pidemu.records.files import Floats, Record, read_record
+from pidemu.records.files import Record, read_record
 from pidemu.records.playback import even_step
-from pidemu.records.sampling import Scale, limits_for, mode_segments
-from pidemu.records.side_by_side import Difference, Limits, Run, bumps, common_notes, difference, labels, run_on
+from pidemu.records.sampling import mode_segments, record_in_percent
+from pidemu.records.side_by_side import Difference, Run, bumps, common_notes, difference, labels, run_on
 from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
 from pidemu.settings.action import Action
+from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings
 
 
@@ -160,7 +161,7 @@ def compare(
     if len(settings) < 2:
         raise ScanError(f"a comparison needs two controllers or more, {len(settings)} given")
     path = "record" if record is None or isinstance(record, Record) else record
-    first = Scale(settings[0])
+    first = settings[0].own_ranges
     scans = _scans(scan, len(settings))
     own = even_step(record) if isinstance(record, StandardRecord) else None
     default = scans[0] or own or default_scan(settings[0].equation)
@@ -168,14 +169,14 @@ def compare(
         base: Record = standard_record(default, 1, *scale_of(settings[0], default))
     else:
         base = record if isinstance(record, Record) else read_record(record)
-        base = base if isinstance(base, StandardRecord) else first.percent(base)
-    given = None if output_limits is None else _percent(first, output_limits)
-    instead = limits_for(settings[0], given, (0.0, 100.0))
-    start = _start(first, base, initial_output)
+        base = base if isinstance(base, StandardRecord) else record_in_percent(base, first)
+    given = None if output_limits is None else first.op.limits_in_percent(output_limits)
+    instead = limits_in_percent(settings[0], given)
+    start = _start(first.op, base, initial_output)
     notes: list[str] = []
     runs = []
     for s, h, label in zip(settings, scans, labels(settings), strict=True):
-        limits = limits_for(s, given, instead)
+        limits = limits_in_percent(s, given, instead)
         runs.append(run_on(base, path, s, label, (h, default), action, limits, start, notes))
     notes += common_notes(runs, path, default if record is not None else None)
     segments = runs[0].record.segments if isinstance(runs[0].record, StandardRecord) else None
@@ -194,16 +195,11 @@ def _scans(given: float | Sequence[float] | None, count: int) -> tuple[float | N
     return tuple(given)
 
 
-def _percent(scale: Scale, limits: Limits) -> Limits:
-    low, high = scale.output_percent(np.array(limits, dtype=float)).tolist()
-    return low, high
-
-
-def _start(scale: Scale, record: Record, given: float | None) -> float:
+def _start(out: SignalRange, record: Record, given: float | None) -> float:
     """Return the output before the first scan [%]."""
     if given is not None:
-        return float(scale.output_percent(np.array(given)))
+        return out.in_percent(float(given))
     if isinstance(record, StandardRecord):
         return REST
     recorded = math.nan if record.output is None else float(record.output[0])
-    return recorded if math.isfinite(recorded) else float(scale.output_percent(np.array(0.0)))
+    return recorded if math.isfinite(recorded) else out.in_percent(0.0)

@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import Final, TextIO
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import RecordError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, read_text
 from pidemu.files.tables import counted, split_lines, split_row, write_rows
 from pidemu.plausible import plain_number
-
-Floats = npt.NDArray[np.float64]
 
 _COLUMNS: Final = {
     "time": ("time", "t", "timestamp"),

@@ -11,11 +11,12 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Flags, Floats
 from pidemu.controller.controller import Controller
 from pidemu.controller.signals import SIGNALS, Event
 from pidemu.errors import RecordError, ScanError
 from pidemu.plausible import SIGNAL
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.settings.settings import Settings
 
 _UNEVEN: Final = 0.01
@@ -247,7 +248,7 @@ def modes(record: Record) -> npt.NDArray[np.str_]:
     return found
 
 
-def spells(mask: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def spells(mask: Flags) -> Iterator[tuple[int, int]]:
     """Yield first and last place of every stretch that is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int))).tolist()
     yield from ((start, end - 1) for start, end in zip(edges[::2], edges[1::2], strict=True))

@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from pidemu.records.files import Floats, Record
+from pidemu.arrays import Floats
+from pidemu.controller.bench import Bench
+from pidemu.records.files import Record
 from pidemu.records.playback import Playback, far_out, play
-from pidemu.records.sampling import Scale, controller_for, sampled
+from pidemu.records.sampling import record_from_percent, sampled
 from pidemu.records.standard import Segment
 from pidemu.settings.action import Action
+from pidemu.settings.ranges import Limits, are_limits
 from pidemu.settings.settings import Settings
 
-Limits = tuple[float, float]
 _HAIR = 1e-6
 """Share of a scan interval by which two times may differ and be the same."""
 
@@ -132,27 +134,27 @@ def run_on(
     notes : list of str
         What is taken for granted is added here.
     """
-    scale = Scale(settings)
+    ranges = settings.own_ranges
     seen, timing = sampled(record, path, scan[0], settings, scan[1])
     for signal, reason in settings.without_use_for(seen.signals).items():
         notes.append(f"{label}: column {seen.names.get(signal, signal)} is left out: {reason}")
         gone: dict[str, Any] = {signal: None}
         seen = replace(seen, **gone)
-    controller, biased = controller_for(settings, timing, action, limits, initial_output)
-    if biased:
+    bench = Bench.in_percent(
+        settings, timing.scan, sp=float(seen.sp[0]), pv=float(seen.pv[0]), op=initial_output, limits=limits, action=action
+    )
+    if bench.is_biased:
         notes.append(f"{label}: without integral action its output at zero error is a bias, {initial_output:g} %")
     if action == "direct" and settings.equation.action.fixed:
         notes.append(f"{label}: there is no choice of action: the sign of the gain decides")
     notes += [f"{label}: {note}" for note in settings.notes]
-    own = scale.own(seen)
-    if np.isfinite([own.sp[0], own.pv[0]]).all() and (own.auto is None or own.auto[0] > 0):
-        controller.rest(float(own.sp[0]), float(own.pv[0]), scale.output_own(initial_output))
-    if not np.isfinite(settings.equation.output.limits).all():
+    resting = math.isfinite(bench.sp) and math.isfinite(bench.pv) and (seen.auto is None or seen.auto[0] > 0)
+    controller = bench.at_rest() if resting else bench.before_first_scan()
+    if not are_limits(settings.equation.output.limits):
         notes.append(f"{label}: the card has no output limits of its own; it has {limits[0]:g} to {limits[1]:g} % here")
-    played = play(controller, own, path, timing.interval)
-    outputs = scale.output_percent(played.outputs)
-    per_unit = float(np.diff(scale.output_percent(np.array([0.0, 1.0])))[0])
-    events = tuple(replace(e, bump=e.bump * per_unit) for e in played.events)
+    played = play(controller, record_from_percent(seen, ranges), path, timing.interval)
+    outputs = ranges.op.in_percent(played.outputs)
+    events = tuple(replace(e, bump=ranges.op.change_in_percent(e.bump)) for e in played.events)
     return Run(label, settings, controller.interval, limits, seen, replace(played, outputs=outputs, events=events))
 
 

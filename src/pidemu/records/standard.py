@@ -9,9 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.errors import ScanError
 from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.settings.settings import Settings
 
 REST: Final = 50.0

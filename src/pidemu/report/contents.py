@@ -67,7 +67,7 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ControllerSheet:
     """One controller: its heading, its dials, and what else is set on it."""
 
     id: str
@@ -125,20 +125,20 @@ class Contents:
         return _VERDICTS[self.verdict]
 
     @property
-    def source(self) -> Side:
+    def source(self) -> ControllerSheet:
         """The old controller as it was found, which is also the way back."""
         s = self.c.source
-        return Side("source", s.card.title, source_rows(s), list(self._facts(s, 0, action_line(s, self.c.action))))
+        return ControllerSheet("source", s.card.title, source_rows(s), list(self._facts(s, 0, action_line(s, self.c.action))))
 
     @property
-    def target(self) -> Side:
+    def target(self) -> ControllerSheet:
         """The new controller."""
         s = self.c.settings
         facts = list(self._facts(s, 1, self.c.action_text))
         rounding = rounding_line(self.certificate, self.c.request.digits)
         neutral = neutral_line(s).removeprefix("neutral, to be set so: ")
         extra = [(title, text) for title, text in (("neutral, to be set so", neutral), ("rounding", rounding)) if text]
-        return Side("target", s.card.title, target_rows(self.c), [*facts, *extra])
+        return ControllerSheet("target", s.card.title, target_rows(self.c), [*facts, *extra])
 
     def _facts(self, s: Settings, side: int, action: str) -> Iterator[tuple[str, str]]:
         scans, real = self.c.request.declared, self.c.request.runs_every

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from pidemu.certificate.scanwise import WIDE
+from pidemu.arrays import Floats
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.law.law import Law
@@ -18,9 +17,9 @@ from pidemu.records.files import Record
 from pidemu.records.side_by_side import run_on
 from pidemu.records.standard import REST, scale_of
 from pidemu.settings.action import acting_alike
+from pidemu.settings.ranges import UNLIMITED
 from pidemu.settings.settings import Settings
 
-Floats = npt.NDArray[np.float64]
 Who = Literal["source", "target", "textbook"]
 
 _POINTS: Final = 400
@@ -85,7 +84,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Responses:
+class StepResponses:
     """Outputs of the emulated controllers in the linear range.
 
     Attributes
@@ -155,7 +154,7 @@ def _held(law: Law, w: Floats) -> Response:
     return found
 
 
-def responses(c: Conversion) -> Responses | None:
+def responses(c: Conversion) -> StepResponses | None:
     """Return the outputs of both emulated controllers, and of the textbook settings where they are others.
 
     They run at the scan intervals of the certificate's emulation, from rest at 50 %, without output limits; the steps move the
@@ -168,7 +167,7 @@ def responses(c: Conversion) -> Responses | None:
 
     Returns
     -------
-    Responses or None
+    StepResponses or None
         ``None`` where the certificate holds no emulation.
     """
     if c.certificate.scan_by_scan is None:
@@ -188,7 +187,7 @@ def responses(c: Conversion) -> Responses | None:
             notes.append(f"the textbook settings are not shown: {error}")
     signals: tuple[Literal["setpoint", "measurement"], ...] = ("setpoint", "measurement")
     first, second = (tuple(_trace(c, one, (at, _AFTER * time), size, moves) for one in shown) for moves in signals)
-    return Responses(at, size, first, second, tuple(notes))
+    return StepResponses(at, size, first, second, tuple(notes))
 
 
 def _differ(a: Settings, b: Settings) -> bool:
@@ -208,7 +207,7 @@ def _trace(
     still = np.full(times.size, REST)
     record = Record(sp=moved, pv=still) if moves == "setpoint" else Record(sp=still, pv=moved)
     action = acting_alike(c.settings, c.factor)[0 if who == "source" else 1]
-    run = run_on(record, moves, settings, who, (h, h), action, WIDE, REST, [])
+    run = run_on(record, moves, settings, who, (h, h), action, UNLIMITED, REST, [])
     factor = abs(c.factor) if who == "source" else 1.0
     outputs: Floats = REST + factor * (run.playback.outputs - REST)
     return Trace(who, times, outputs)
@@ -257,7 +256,7 @@ def closed_loops(c: Conversion) -> ClosedLoops | None:
             setpoint=(first, _STEP),
             load=(then, _STEP / factor),
             time=2.1 * shown,
-            output_limits=WIDE,
+            output_limits=UNLIMITED,
         )
         measurement.append(Trace(who, run.times, run.measurement))
         output.append(Trace(who, run.times, REST + factor * (run.output - REST)))

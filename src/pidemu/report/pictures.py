@@ -10,17 +10,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.certificate.figures import number
 from pidemu.law.rational import Response
-from pidemu.report.curves import Bode, ClosedLoops, Responses, Trace, Who
+from pidemu.report.curves import Bode, ClosedLoops, StepResponses, Trace, Who
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = npt.NDArray[np.float64]
 
 _WIDTH: Final = 7.4
 """Width of all pictures [in]: that of the text on an A4 page."""
@@ -98,12 +97,12 @@ def bode_picture(b: Bode, names: Mapping[Who, str]) -> str:
         return _svg(figure, "bode", left[0], marks)
 
 
-def responses_picture(r: Responses, names: Mapping[Who, str]) -> str:
+def responses_picture(r: StepResponses, names: Mapping[Who, str]) -> str:
     """Return the picture of the emulated controllers' outputs after two steps, as an SVG element.
 
     Parameters
     ----------
-    r : Responses
+    r : StepResponses
         The outputs.
     names : mapping
         What to call source, target and textbook rule.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -10,14 +9,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pidemu.arrays import Floats
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
 from pidemu.files.writing import beside
 from pidemu.records.compare import Comparison
-from pidemu.records.files import Floats, Record
+from pidemu.records.files import Record
 from pidemu.records.playback import Playback, modes, spells
 from pidemu.records.side_by_side import dials
 from pidemu.records.standard import StandardRecord
+from pidemu.settings.ranges import is_limit
 from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
@@ -206,7 +207,7 @@ def _window(axis: Axes, curves: Iterable[Floats], limits: Sequence[float], least
     low, high = (float(found.min()), float(found.max())) if found.size else (0.0, 1.0)
     room = max(high - low, least)
     margin = max(0.07 * (high - low), 0.5 * least)
-    near = [x for x in limits if math.isfinite(x) and low - 0.25 * room <= x <= high + 0.25 * room]
+    near = [x for x in limits if is_limit(x) and low - 0.25 * room <= x <= high + 0.25 * room]
     for i, x in enumerate(near):
         axis.axhline(x, color=_QUIET, linestyle=(0, (5, 4)), linewidth=0.9, label="" if i else "output limit")
     low, high = min([low, *near]), max([high, *near])

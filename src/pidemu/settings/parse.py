@@ -11,8 +11,8 @@ from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
-from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, Quantity, number, shown
-from pidemu.settings.ranges import RANGES, SignalRange, read_range
+from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, PlausibleSize, number, shown
+from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range
 from pidemu.settings.settings import Settings, Value, limits, off_values, spans_of
 from pidemu.units import (
     LEVELS,
@@ -30,7 +30,7 @@ from pidemu.units import (
 
 _RATES: Final = (Dimension.REPEATS_PER_TIME, Dimension.PER_TIME)
 _OF_WHOLE_OUTPUT: Final = (Dimension.PV_UNITS, Dimension.PERCENT_PER_PV)
-_QUANTITIES: Final[dict[Role, Quantity]] = {
+_QUANTITIES: Final[dict[Role, PlausibleSize]] = {
     **dict.fromkeys((Role.GAIN, Role.MULTIPLIER, Role.PROCESS_GAIN), GAIN),
     **dict.fromkeys((Role.DERIVATIVE, Role.FILTER_TIME, Role.TRACKING_TIME), TIME),
     **dict.fromkeys((Role.PROCESS_TIME, Role.PROCESS_DELAY, Role.CLOSED_LOOP_TIME), TIME),
@@ -129,7 +129,7 @@ def signal_range(card: Card, name: str, given: object) -> SignalRange | None:
 def _output_range(equation: Equation) -> SignalRange | None:
     """Return the output's range where it is the card's: a band, or a gain in % of output, moves it over just that."""
     units = [parse_unit(s.unit).dimension for s in equation.settings.values() if s.sets == "gain"]
-    known = equation.signals == "engineering" and all(map(math.isfinite, equation.output.limits))
+    known = equation.signals == "engineering" and are_limits(equation.output.limits)
     return SignalRange(*equation.output.limits) if known and units and units[0] in _OF_WHOLE_OUTPUT else None
 
 

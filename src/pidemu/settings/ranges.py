@@ -1,4 +1,8 @@
-"""Signal ranges with their units, and how they are read."""
+"""Signal ranges with their units: how they are read, and how a signal in percent of one is written in the units of it.
+
+Everything that goes between percent and the units that a controller computes in goes through here: levels, such as a setpoint, from
+the low end on; changes, such as a step, a band or a rate, in proportion to the span; limits, which may be none.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,24 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
 
 from pidemu.errors import SettingError
 from pidemu.excerpt import quoted
 from pidemu.formatting import exactly
-from pidemu.plausible import ENDS, SPAN, number, plain_number, shown
+from pidemu.plausible import ENDS, SIGNAL, SPAN, number, plain_number, shown
+
+if TYPE_CHECKING:
+    from pidemu.arrays import Floats  # NumPy takes its time, and who reads a card needs none of it
+
+Limits = tuple[float, float]
+"""The low and the high limit of an output."""
+NO_LIMIT: Final = SIGNAL
+"""A limit of this size is none, whatever its unit: no signal reaches it, and cards write their largest float32 for it."""
+UNLIMITED: Final[Limits] = (-NO_LIMIT, NO_LIMIT)
+"""Output limits with which a controller runs as if it had none. They are finite, so that what grows without end stays a number."""
+
+_Signal = TypeVar("_Signal", float, "Floats")
 
 Which = Literal["pv_range", "op_range"]
 
@@ -63,6 +79,32 @@ class SignalRange:
         """Width [`unit`]."""
         return self.high - self.low
 
+    def from_percent(self, x: _Signal) -> _Signal:
+        """Return the level at so many percent [`unit`]."""
+        return x if self.ends == _FULL else self.low + x * (self.span / 100)
+
+    def in_percent(self, level: _Signal) -> _Signal:
+        """Return a level [`unit`] in percent."""
+        return level if self.ends == _FULL else (level - self.low) * (100 / self.span)
+
+    def change_from_percent(self, x: _Signal) -> _Signal:
+        """Return a change by so many percent of the span, or a width or a rate [`unit`]."""
+        return x * (self.span / 100)
+
+    def change_in_percent(self, change: _Signal) -> _Signal:
+        """Return a change, a width or a rate [`unit`] in percent of the span."""
+        return change * (100 / self.span)
+
+    def limits_from_percent(self, limits: Limits) -> Limits:
+        """Return limits in percent as levels [`unit`]; what is no limit stays as it is."""
+        low, high = (self.from_percent(x) if is_limit(x) else x for x in map(float, limits))
+        return low, high
+
+    def limits_in_percent(self, limits: Limits) -> Limits:
+        """Return limits [`unit`] in percent; what is no limit stays as it is."""
+        low, high = (self.in_percent(x) if is_limit(x) else x for x in map(float, limits))
+        return low, high
+
     @property
     def argument(self) -> str:
         """The range as ``--pv-range`` and `read_range` take it."""
@@ -75,10 +117,34 @@ class SignalRange:
         return plain if self.meaning is None else {**plain, "meaning": self.meaning.to_dict()}
 
 
+class SignalRanges(NamedTuple):
+    """The ranges of measurement and output; the setpoint has that of the measurement."""
+
+    pv: SignalRange
+    op: SignalRange
+
+
 RangeGiven = SignalRange | str | Sequence[float | str]
 """What `read_range` reads."""
 PERCENT: Final = SignalRange(0.0, 100.0, "%")
 """The range of a signal in percent."""
+_FULL: Final = PERCENT.ends
+
+
+def is_limit(x: float) -> bool:
+    """Tell whether a limit is one: cards without an output limit write infinity for it, or the largest number that they can."""
+    return abs(x) < NO_LIMIT
+
+
+def are_limits(limits: Limits) -> bool:
+    """Tell whether both limits are limits."""
+    return all(map(is_limit, limits))
+
+
+def infinite_where_none(limits: Limits) -> Limits:
+    """Return limits with infinity for those that are none, for words and comparisons."""
+    low, high = (x if is_limit(x) else math.copysign(math.inf, x) for x in limits)
+    return low, high
 
 
 def read_range(given: object) -> SignalRange:

@@ -12,7 +12,7 @@ from pidemu.card.model.card_file import Equation, Setting
 from pidemu.card.model.signals import SignalFilter
 from pidemu.errors import ScanError
 from pidemu.plausible import INTERVAL, plausible
-from pidemu.settings.ranges import PERCENT, SignalRange
+from pidemu.settings.ranges import PERCENT, SignalRange, SignalRanges
 from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
 
 if TYPE_CHECKING:
@@ -203,11 +203,11 @@ class Settings(Mapping[str, Value]):
         return replace(self, values_by_name=values, scan=scan)
 
     @property
-    def own_ranges(self) -> tuple[SignalRange, SignalRange]:
+    def own_ranges(self) -> SignalRanges:
         """Ranges of measurement and output in the units that the card computes in: percent, or the ranges given, else 0 to 100."""
         if self.equation.signals == "percent":
-            return PERCENT, PERCENT
-        return self.pv_range or PERCENT, self.op_range or PERCENT
+            return SignalRanges(PERCENT, PERCENT)
+        return SignalRanges(self.pv_range or PERCENT, self.op_range or PERCENT)
 
     def by_role(self, role: Role) -> Value | None:
         """Return the active dial that sets `role`, or ``None``."""

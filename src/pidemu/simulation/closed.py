@@ -12,9 +12,9 @@ from typing import Final
 from pidemu.process.hold import SampledProcess
 from pidemu.program import blocks
 from pidemu.program.ir import Assign, Expr, Line, Name, Operand, Program, Quantity, expr
+from pidemu.settings.ranges import PERCENT, SignalRanges
 
-Span = tuple[float, float]
-PERCENT: Final[Span] = (0.0, 100.0)
+_IN_PERCENT: Final = SignalRanges(PERCENT, PERCENT)
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Parts:
 
 
 def closed_loop(
-    controller: Program, process: SampledProcess, rest: tuple[float, float], span: Span = PERCENT, output_span: Span = PERCENT
+    controller: Program, process: SampledProcess, rest: tuple[float, float], ranges: SignalRanges = _IN_PERCENT
 ) -> Program:
     """Return the program of a controller and a process that starts at rest; it reads setpoint and load, both in percent.
 
@@ -75,27 +75,25 @@ def closed_loop(
         The process, sampled at the controller's scan interval.
     rest : tuple of float
         Measurement and output at which the process is at rest [%].
-    span : tuple of float
-        What 0 and 100 % of setpoint and measurement are in the controller's units.
-    output_span : tuple of float
-        What 0 and 100 % of the output are in the controller's units.
+    ranges : SignalRanges
+        What 0 and 100 % of the signals are in the controller's units.
     """
     p = Parts()
-    own = controller.precision == "float64" and span == PERCENT
+    own = controller.precision == "float64" and ranges.pv.ends == PERCENT.ends
     setpoint, y = ("sp", "pv") if own else ("setpoint", "measurement")
     x = [p.state(f"process_x{i}", "state of the process") for i in range(1, process.row.size + 1)]
     uses_last = bool(process.through or process.early.any())
     was = p.state("process_was", "what reached the process in the last scan") if uses_last else Name("process_was")
     _measured(p, process, [*x, was], y, rest[0])
     if not own:
-        low = p.coefficient("span_low", span[0], "0 % in the controller's units", "units")
-        per = p.coefficient("span_per", (span[1] - span[0]) / 100, "the controller's units per percent", "units/%")
+        low = p.coefficient("span_low", ranges.pv.low, "0 % in the controller's units", "units")
+        per = p.coefficient("span_per", ranges.pv.change_from_percent(1.0), "the controller's units per percent", "units/%")
         p.first("sp", low + Name(setpoint) * per, "setpoint in the controller's units", "units")
         p.first("pv", low + Name(y) * per, "measurement in the controller's units", "units")
     output = controller.output
-    if output_span != PERCENT:
-        bottom = p.coefficient("output_low", output_span[0], "0 % of the output in the controller's units", "units")
-        per = p.coefficient("output_per", 100 / (output_span[1] - output_span[0]), "percent per unit of the output", "%/unit")
+    if ranges.op.ends != PERCENT.ends:
+        bottom = p.coefficient("output_low", ranges.op.low, "0 % of the output in the controller's units", "units")
+        per = p.coefficient("output_per", ranges.op.change_in_percent(1.0), "percent per unit of the output", "%/unit")
         output = p.then("output", (Name(controller.output) - bottom) * per, "output in percent").id
     at_rest = p.coefficient("process_rest", rest[1], "output at which the process is at rest")
     moved = p.then("process_in", Name(output) - at_rest + Name("load"), "what enters the process, from rest on")

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.program.blocks import magnitude
 from pidemu.program.ir import Expr, Name, Program, select
 from pidemu.simulation.closed import Parts
 
-Floats = npt.NDArray[np.float64]
 FIGURES: Final = {"iae": "% s", "peak": "%", "travel": "%", "at_low": "s", "at_high": "s", "swing": "%"}
 """The states that hold what is measured, with their units.
 

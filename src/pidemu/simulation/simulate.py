@@ -6,23 +6,20 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pidemu.analysis.figures import loop_figures
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
 from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
+from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record, safe_runner
 from pidemu.backends.python import starting
 from pidemu.controller.controller import Controller
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
-from pidemu.records.sampling import Scale
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.experiment import integral_of_error
 from pidemu.simulation.trial import Step, Trial, first_scan, trial
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -219,14 +216,13 @@ def _scan_by_scan(
     controller: Controller, plant: Plant, sp: Floats, load: Floats, initial: tuple[float, float, float]
 ) -> tuple[Floats, Floats]:
     """Close the loop of an emulated controller; return measurement and output [%]."""
-    scale = Scale(controller.settings)
-    (low, high), (bottom, top) = scale.spans
-    own_sp, rest_pv, rest_output = scale.signals_own(sp).tolist(), initial[1], initial[2]
+    ranges = controller.settings.own_ranges
+    own_sp, rest_pv, rest_output = ranges.pv.from_percent(sp).tolist(), initial[1], initial[2]
     pv, out = np.empty(sp.size), np.empty(sp.size)
     with np.errstate(over="ignore", invalid="ignore"):
         for i, (r, d) in enumerate(zip(own_sp, load.tolist(), strict=True)):
             y = rest_pv + plant.measure()
-            u = controller.scan(r, low + y * ((high - low) / 100))
-            pv[i], out[i] = y, (u - bottom) * (100 / (top - bottom))
+            u = controller.scan(r, ranges.pv.from_percent(y))
+            pv[i], out[i] = y, ranges.op.in_percent(u)
             plant.move(out[i] - rest_output + d)
     return pv, out

@@ -8,30 +8,26 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pidemu.analysis.figures import scan_for, settling_time
 from pidemu.analysis.open_loop import low_frequency_sign
+from pidemu.arrays import Floats
+from pidemu.controller.bench import Bench, limits_in_percent
 from pidemu.controller.controller import Controller
 from pidemu.errors import ProcessError
 from pidemu.plausible import INTERVAL, LEVEL, TIME, plausible, shown
 from pidemu.process.process import Process
 from pidemu.program.ir import Program
 from pidemu.program.specialise import specialise
-from pidemu.records.playback import Timing
-from pidemu.records.sampling import Scale, controller_for, limits_for
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.closed import closed_loop
 
-Floats = npt.NDArray[np.float64]
 Step = tuple[float, float]
 
 _DEFAULT_SCANS: Final = 50_000
 """The default duration ends here."""
 _MOST_SCANS: Final = 20_000_000
-_FULL: Final = (0.0, 100.0)
-_UNLIMITED: Final = (-1e12, 1e12)
 
 
 @dataclass(frozen=True)
@@ -94,25 +90,15 @@ class Trial:
 
     def controller(self) -> Controller:
         """Return the controller at rest; where nothing integrates, its bias is such that its output is the initial one there."""
-        settings, scale = self.settings, Scale(self.settings)
-        sp, pv = scale.signals_own(np.array(self.initial[:2])).tolist()
-        output = scale.output_own(self.initial[2])
-        controller, biased = controller_for(settings, Timing(self.scan), self.action, self.limits, self.initial[2])
-        if biased:
-            trial, _ = controller_for(settings, Timing(self.scan), self.action, _UNLIMITED, self.initial[2])
-            trial.rest(sp, pv, output)
-            bias = 2 * output - trial.scan(sp, pv)
-            own = (scale.output_own(self.limits[0]), scale.output_own(self.limits[1]))
-            controller = Controller(settings, self.scan, self.action, own, bias=bias, initial_output=output)
-        controller.rest(sp, pv, output)
-        return controller
+        sp, pv, op = self.initial
+        bench = Bench.in_percent(self.settings, self.scan, sp=sp, pv=pv, op=op, limits=self.limits, action=self.action)
+        return bench.balanced()
 
     def program(self, controller: Controller) -> Program:
         """Return the closed loop of a controller at rest (`pidemu.simulation.closed.closed_loop`)."""
         at_rest = replace(controller.program, initial=tuple(controller.state.values()))
-        pv_span, output_span = Scale(self.settings).spans
         rest = (self.initial[1], self.initial[2])
-        return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, pv_span, output_span)
+        return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, self.settings.own_ranges)
 
 
 def first_scan(at: float, scan: float, scans: int) -> int:
@@ -158,7 +144,7 @@ def trial(
         )
     sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
     chosen = action or _negative_feedback(settings, process)
-    limits = limits_for(settings, output_limits, _FULL)
+    limits = limits_in_percent(settings, output_limits)
     if not limits[0] < limits[1]:  # not a number compares false as well
         raise ProcessError(f"output limits {limits[0]:g} to {limits[1]:g} % are not a range; give low, then high, such as (0, 100)")
     if not limits[0] <= initial[2] <= limits[1]:

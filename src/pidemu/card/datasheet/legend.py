@@ -17,7 +17,7 @@ _TIMES: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 
 
 @dataclass(frozen=True, slots=True)
-class Signals:
+class SignalNames:
     """The names of the signals as the terms see them.
 
     Attributes
@@ -36,7 +36,7 @@ class Signals:
     filtered: bool
 
     @classmethod
-    def of(cls, q: Equation) -> Signals:
+    def of(cls, q: Equation) -> SignalNames:
         """Return the signals of an equation."""
         sp, pv, filt = q.setpoint, q.measurement, filter_at_work(q)
         on_measurement = filt is not None and filt.applies_to == "measurement"
@@ -115,7 +115,7 @@ def _error(q: Equation) -> Iterator[str]:
     if q.error is None:
         return
     if q.error.filter is not None:
-        yield f"E = ({replace(Signals.of(q), filtered=False).on('error')})/(1 + Te s)"
+        yield f"E = ({replace(SignalNames.of(q), filtered=False).on('error')})/(1 + Te s)"
         yield from _lag_time(q, "Te", q.error.filter)
     if q.error.shape != "linear":
         yield _shape(q, q.error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pidemu.card.datasheet.legend import Signals, filter_at_work, legend
+from pidemu.card.datasheet.legend import SignalNames, filter_at_work, legend
 from pidemu.card.load import Variant
 from pidemu.card.model.base import Form, Reference
 from pidemu.card.model.card_file import Equation
@@ -36,7 +36,7 @@ def equation_lines(variant: Variant) -> list[str]:
     """
     q = variant.equation
     if q.form is Form.DAHLIN:
-        return [f"OUT = D(z) {_bracketed(_shaped(q, Signals.of(q).on('error'), 'integral'))}{_feedforward(q)}", *legend(q)]
+        return [f"OUT = D(z) {_bracketed(_shaped(q, SignalNames.of(q).on('error'), 'integral'))}{_feedforward(q)}", *legend(q)]
     lines = [f"OUT = {_sum(q, q.proportional, 'b')}"]
     other = another_structure(q)
     if other is not None:
@@ -53,7 +53,7 @@ def another_structure(q: Equation) -> Proportional[Reference] | None:
 
 
 def _sum(q: Equation, proportional: Proportional[Reference], weight: str) -> str:
-    s, parallel = Signals.of(q), q.form is Form.PARALLEL
+    s, parallel = SignalNames.of(q), q.form is Form.PARALLEL
     parts = _factored(q, proportional, s, weight) if _as_a_lead(q) else _terms(q, proportional, s, weight)
     total = " + ".join(parts) or "0"
     total = total if parallel else f"K [ {total} ]"
@@ -80,7 +80,7 @@ def _as_a_lead(q: Equation) -> bool:
     return _is_series(q) and q.error is None and not q.action.fixed
 
 
-def _terms(q: Equation, proportional: Proportional[Reference], s: Signals, weight: str) -> list[str]:
+def _terms(q: Equation, proportional: Proportional[Reference], s: SignalNames, weight: str) -> list[str]:
     parallel, series = q.form is Form.PARALLEL, _is_series(q)
     parts = []
     if proportional.on != "none":
@@ -113,7 +113,7 @@ def _derivative(q: Equation) -> str:
     return "s/(1 + Tf s)" if filt is not None and filt.applies_to in ("term", "lead-lag") else "s"
 
 
-def _factored(q: Equation, proportional: Proportional[Reference], s: Signals, weight: str) -> list[str]:
+def _factored(q: Equation, proportional: Proportional[Reference], s: SignalNames, weight: str) -> list[str]:
     """Return the terms of the series form with the derivative as a lead L on the signals.
 
     With ``Dx = (L - 1)(c SP - PV)`` and ``Lc = 1 + c (L - 1)``, P and Dx are together ``(b + Lc - 1) SP - L PV``.
@@ -140,6 +140,8 @@ def _series_lines(q: Equation) -> list[str]:
     filt = q.derivative.filter
     lead_lag = filt is not None and filt.applies_to == "lead-lag"
     if not _as_a_lead(q):
-        return [f"Dx = {'(Td - Tf)' if lead_lag else 'Td'} {_derivative(q)} {_bracketed(Signals.of(q).on(q.derivative.on, 'c'))}"]
+        return [
+            f"Dx = {'(Td - Tf)' if lead_lag else 'Td'} {_derivative(q)} {_bracketed(SignalNames.of(q).on(q.derivative.on, 'c'))}"
+        ]
     lines = ["L = (1 + Td s)/(1 + Tf s)" if lead_lag else f"L = 1 + Td {_derivative(q)}"]
     return [*lines, "Lc = 1 + c (L - 1)"] if q.derivative.on == "weighted" else lines

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Complexes
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.ambiguity.meanings import as_reset_rates, bare, in_words, possible_units, written
@@ -28,7 +28,7 @@ class Laws:
     """Tells laws for measurement apart, by number."""
 
     def __init__(self) -> None:
-        self.seen: list[npt.NDArray[np.complex128]] = []
+        self.seen: list[Complexes] = []
 
     def number(self, settings: Settings) -> int:
         """Return the number of the first law seen that agrees over all frequencies."""

@@ -7,67 +7,71 @@ from math import copysign, isfinite
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.card_file import default_scan
+from pidemu.controller.bench import Bench
 from pidemu.controller.controller import Controller
 from pidemu.errors import ScanError
 from pidemu.settings.action import Action, switch_position
-from pidemu.settings.ranges import SignalRange
+from pidemu.settings.ranges import PERCENT, Limits, SignalRange
 from pidemu.settings.settings import Settings, Value
 from pidemu.units import FULL, Role, from_canonical, parse_unit
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
-    """A signal's range: between the units that it is given in and the controller's own.
+class ShownSignal:
+    """A signal as it is shown to the operator, in the units that it is given in, and as the controller has it, in its own.
 
     Attributes
     ----------
-    low, span : float
-        Low end and span [as given].
+    range : SignalRange
+        The range that it is shown in: in percent where none is given.
     rescaled : bool
         Whether the controller computes in percent of it, so that the two units differ.
-    unit : str
-        The unit that the signal is given in: that of its range, ``eu`` where it states none, ``%`` without a range.
     """
 
-    low: float
-    span: float
+    range: SignalRange
     rescaled: bool
-    unit: str
+
+    @property
+    def unit(self) -> str:
+        """The unit that the signal is given in: that of its range, ``eu`` where it states none, ``%`` without a range."""
+        return self.range.unit or "eu"
 
     def own(self, x: float) -> float:
         """Return a value in the controller's own units."""
-        return (x - self.low) * (100 / self.span) if self.rescaled else x
+        return self.range.in_percent(x) if self.rescaled else x
+
+    def own_limits(self, limits: Limits) -> Limits:
+        """Return limits in the controller's own units."""
+        return self.range.limits_in_percent(limits) if self.rescaled else limits
 
     def given(self, x: float) -> float:
         """Return a value of the controller's in the units that the signal is given in."""
-        return self.low + self.move(x) if self.rescaled else x
+        return self.range.from_percent(x) if self.rescaled else x
 
     def other_than(self, x: float) -> float:
         """Return the low end of the range, or the high one where that is `x` [own units]."""
-        low, high = self.own(self.low), self.own(self.low + self.span)
+        low, high = map(self.own, self.range.ends)
         return high if x == low else low
 
     def move(self, x: float) -> float:
         """Return a change in the units that the signal is given in."""
-        return x * (self.span / 100) if self.rescaled else x
+        return self.range.change_from_percent(x) if self.rescaled else x
 
     def percent(self, x: float) -> float:
         """Return a change in percent of span."""
-        return x if self.rescaled else x * (100 / self.span)
+        return x if self.rescaled else self.range.change_in_percent(x)
 
     def text(self, own: float) -> str:
         """Return a value of the controller's with the unit that the signal is given in."""
         return f"{self.given(own):.6g} {self.unit}"
 
 
-def _range(settings: Settings, given: SignalRange | None) -> Range:
-    if given is None:
-        return Range(0.0, 100.0, False, "%")
-    return Range(given.low, given.span, settings.equation.signals == "percent", given.unit or "eu")
+def _shown(settings: Settings, given: SignalRange | None) -> ShownSignal:
+    return ShownSignal(given or PERCENT, given is not None and settings.equation.signals == "percent")
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class Takeover:
     """The target at the cut-over, in its own units.
 
     Attributes
@@ -84,8 +88,8 @@ class Bench:
         Output limits.
     sp, pv, op : float
         Setpoint, measurement, and the output at which the valve stands.
-    measured, out : Range
-        Ranges of measurement and output.
+    measured, out : ShownSignal
+        Measurement and output as they are shown.
     gain : float
         What the operator's number is multiplied by in manual; 0: the output is 0 there.
     action_known : bool
@@ -96,12 +100,12 @@ class Bench:
     a: Algorithm
     scan: float
     action: Action
-    limits: tuple[float, float]
+    limits: Limits
     sp: float
     pv: float
     op: float
-    measured: Range
-    out: Range
+    measured: ShownSignal
+    out: ShownSignal
     gain: float = 1.0
     action_known: bool = True
 
@@ -146,7 +150,7 @@ class Bench:
         if bias is not None and (dial := settings.by_role(Role.BIAS)) is not None:
             settings, behind = settings.changed({dial.name: self.on_dial(dial, bias)}), 0.0
         position = switch_position(settings, self.action)
-        return Controller(settings, self.scan, position, self.limits, bias=behind, initial_output=self.op)
+        return Bench(settings, self.scan, self.sp, self.pv, self.op, self.limits, position).before_first_scan(behind)
 
     def on_dial(self, dial: Value, bias: float) -> float:
         """Return the value on a dial, in its unit, that makes a bias [own output units]."""
@@ -154,9 +158,9 @@ class Bench:
         return from_canonical(Role.BIAS, bias, parse_unit(dial.unit), FULL if engineering else self.settings.spans)
 
 
-def bench_for(
-    target: Settings, signals: tuple[float, float, float], scan: float | None, action: Action, limits: tuple[float, float] | None
-) -> Bench:
+def takeover_of(
+    target: Settings, signals: tuple[float, float, float], scan: float | None, action: Action, limits: Limits | None
+) -> Takeover:
     """Check what is given and put it into the controller's own units.
 
     Parameters
@@ -181,9 +185,9 @@ def bench_for(
     for what, x in zip(("setpoint", "measurement", "output"), signals, strict=True):
         if not isfinite(x):
             raise ScanError(f"{name}: the {what} {x} is not a finite number; give the one at the cut-over")
-    measured, out = _range(target, target.pv_range), _range(target, target.op_range)
+    measured, out = _shown(target, target.pv_range), _shown(target, target.op_range)
     sp, pv, op = measured.own(float(signals[0])), measured.own(float(signals[1])), out.own(float(signals[2]))
-    low, high = target.equation.output.limits if limits is None else (out.own(limits[0]), out.own(limits[1]))
+    low, high = target.equation.output.limits if limits is None else out.own_limits(limits)
     rounding = 1e-12 * max(1.0, abs(op))  # a limit in engineering units is one in percent but for this
     if not low - rounding <= op <= high + rounding:
         raise ScanError(
@@ -193,13 +197,13 @@ def bench_for(
         )
     a = target.algorithm(own_units=True, scan=scan)
     h = default_scan(target.equation) if scan is None else float(scan)
-    bench = Bench(target, a, h, action, (low, high), sp, pv, op, measured, out)
-    return replace(bench, gain=_gain_by_hand(bench))
+    new = Takeover(target, a, h, action, (low, high), sp, pv, op, measured, out)
+    return replace(new, gain=_gain_by_hand(new))
 
 
-def _gain_by_hand(bench: Bench) -> float:
+def _gain_by_hand(new: Takeover) -> float:
     """Return what the operator's number is multiplied by in manual (section 6)."""
-    if bench.a.transfer.manual_output == "operator":
+    if new.a.transfer.manual_output == "operator":
         return 1.0
-    one = bench.controller(None).scan(bench.sp, bench.pv, auto=False, manual=1.0)
-    return copysign(bench.a.kp, one) if one else 0.0
+    one = new.controller(None).scan(new.sp, new.pv, auto=False, manual=1.0)
+    return copysign(new.a.kp, one) if one else 0.0
