@@ -23,10 +23,10 @@ from pidemu.conversion.asking import (
 )
 from pidemu.conversion.certify import full_certificate
 from pidemu.conversion.command import set_words
-from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match.moments import check_optimiser
+from pidemu.conversion.match.no_match import REFUSALS
 from pidemu.conversion.match_method import Aim, read_aim
 from pidemu.conversion.modes import MODES, Mode
-from pidemu.conversion.moments import check_optimiser
 from pidemu.conversion.options import Attempt, attempts
 from pidemu.conversion.questions import Question
 from pidemu.conversion.refusals import (
@@ -40,9 +40,12 @@ from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
-from pidemu.conversion.solve import Solver
+from pidemu.conversion.solver.closed_forms import textbook
+from pidemu.conversion.solver.solver import Solver, make_solver
 from pidemu.conversion.spans import rescaling
-from pidemu.conversion.target import Target, is_computed
+from pidemu.conversion.target.computed import is_computed
+from pidemu.conversion.target.prepare import prepare_target
+from pidemu.conversion.target.target import Target
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ScanError, SettingError
 from pidemu.law.exact import as_typed
@@ -237,28 +240,36 @@ def _concluded(
     emulate: bool,
 ) -> Conversion:
     """Return the conversion with its certificate, about the dials as they are printed."""
-    work = best.solver
+    work, found = best.solver, best.found
     assert work is not None  # there are settings
+    assert found is not None
     unrounded = settings
     dials: tuple[Rounded, ...] = ()
     if request.digits is not None:
         settings, dials = rounded(settings, request.digits, request.given)
     stated = None if request.limits is None else Scale(source).limits_percent(request.limits)
-    certificate = full_certificate(work, settings, unrounded if dials else settings, limits=stated, emulate=emulate)
+    certificate = full_certificate(
+        work.yardstick,
+        settings,
+        unrounded if dials else settings,
+        compensated=found.compensated,
+        limits=stated,
+        emulate=emulate,
+    )
     if dials:
         certificate = replace(certificate, dials=dials)
     return Conversion(
         source=source,
         settings=settings,
         unrounded=unrounded,
-        match=best.match,
+        match=found.match,
         certificate=certificate,
         textbook=_textbook(work),
         warnings=(),
         refusal=refusal,
         chosen=_chosen(settings, request),
         ranking=ranking,
-        factor=work.factor,
+        factor=work.yardstick.factor,
         scan=request.scan,
         process=request.process,
         request=request,
@@ -298,10 +309,12 @@ class _Work:
             source = self.source
             ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
             scan = request.declared[1] if request.declared else None
-            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan, self.source_lag)
-            goal.reject_missing()
+            goal = prepare_target(
+                self.card, named, self.fixed, ranges,
+                pace=request.pace[1], scan=scan, source_lag=self.source_lag, idle_gain=_idle_gain(source),
+            )  # fmt: skip
             sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
-            return Solver(
+            return make_solver(
                 source, goal, sign * self.factor, request.scan, request.process, compensate=request.compensate, mode=request.mode
             )
 
@@ -367,8 +380,14 @@ def _nearest(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | Non
     first = min(ranking, key=lambda a: len(a.changed))
     if first.solver is None or first.error is None or isinstance(first.error, ScanError):
         raise first.error or ConversionRefusedError("there are no options left to try")
-    settings, refusal = first.solver.refused(first.error)
-    return replace(first, match="constrained"), refusal, settings
+    found, refusal = first.solver.refused(first.error)
+    return replace(first, found=found), refusal, None if found is None else found.settings
+
+
+def _idle_gain(source: Settings) -> float:
+    """Return the gain that a target's times are scaled by where the source has no proportional term: that on the source's dial."""
+    gain = source.by_role(Role.GAIN)
+    return 1.0 if gain is None or source.algorithm().kp else gain.canonical or 1.0
 
 
 def _is_negative(source: Settings, target: Target) -> bool:
@@ -405,7 +424,7 @@ def _as_it_runs(v: Value, source: Settings) -> float:
 def _textbook(solver: Solver) -> Textbook:
     """Return what the textbook rule gives, with its figures."""
     try:
-        book = solver.forms.textbook()
-        return Textbook(book, solver.certify(book))
-    except (NoMatchError, SettingError) as error:
+        book = textbook(solver.pair).settings
+        return Textbook(book, solver.yardstick.certify(book))
+    except REFUSALS as error:
         return Textbook(None, None, str(error))
