@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -24,20 +24,25 @@ _FREQUENCIES: Final = np.geomspace(1e-7, 1e4, 133)
 _TERMS: Final = {Role.GAIN: "proportional", Role.INTEGRAL: "integral", Role.DERIVATIVE: "derivative"}
 
 
-class Laws:
-    """Tells laws for measurement apart, by number."""
+Response = npt.NDArray[np.complex128]
+"""A law for measurement at the frequencies where laws are compared."""
 
-    def __init__(self) -> None:
-        self.seen: list[npt.NDArray[np.complex128]] = []
 
-    def number(self, settings: Settings) -> int:
-        """Return the number of the first law seen that agrees over all frequencies."""
-        response = settings.law().response(_FREQUENCIES)
-        for k, known in enumerate(self.seen):
-            if np.allclose(response, known, rtol=EXACT, atol=0.0):
-                return k
-        self.seen.append(response)
-        return len(self.seen) - 1
+def response_of(settings: Settings) -> Response:
+    """Return what tells the law of settings from others."""
+    return settings.law().response(_FREQUENCIES)
+
+
+def law_numbers(responses: Iterable[Response]) -> list[int]:
+    """Return a number for each law: that of the first one that agrees with it over all frequencies."""
+    known: list[Response] = []
+    numbers = []
+    for response in responses:
+        number = next((k for k, x in enumerate(known) if np.allclose(response, x, rtol=EXACT, atol=0.0)), len(known))
+        if number == len(known):
+            known.append(response)
+        numbers.append(number)
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -54,8 +59,8 @@ class Candidate:
         What the integral dial is taken for, in words.
     way : int
         Which meaning it is; 0: the card's own unit.
-    law : int
-        The number of its law.
+    response : array of complex
+        What tells its law from others.
     options : dict
         The options that it states: given, open, or not at their default.
     """
@@ -64,7 +69,7 @@ class Candidate:
     values: Mapping[str, object]
     about: str
     way: int
-    law: int
+    response: Response = field(repr=False, compare=False)
     options: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -84,7 +89,7 @@ class Candidate:
         ]
 
 
-def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[Candidate]:
+def candidates_of(card: Card, given: Mapping[str, object]) -> list[Candidate]:
     """Return what settings may mean on one card.
 
     Parameters
@@ -93,8 +98,6 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
         The card.
     given : mapping
         Settings, options and ranges by name, as for `Card.settings`.
-    laws : Laws
-        Numbers the laws.
 
     Returns
     -------
@@ -110,7 +113,7 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
     for choice in itertools.product(*(card.options[name] for name in open_options)):
         with contextlib.suppress(SettingError, CardError):  # choices that do not go together
             variant = card.variant({**stated, **dict(zip(open_options, choice, strict=True))})
-            found[choice] = _meanings(variant, dials, ranges, laws)
+            found[choice] = _meanings(variant, dials, ranges)
     if any(_at_work(c.settings) for several in found.values() for c in several):
         found = {choice: [c for c in several if _at_work(c.settings)] for choice, several in found.items()}
     found = {choice: several for choice, several in found.items() if several}
@@ -124,7 +127,8 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
 
 def _that_matter(found: Mapping[tuple[str, ...], Sequence[Candidate]]) -> list[int]:
     """Return which options matter: changed alone, they lead to other laws."""
-    reached = {choice: {c.law for c in several} for choice, several in found.items()}
+    numbers = iter(law_numbers(c.response for several in found.values() for c in several))
+    reached = {choice: {next(numbers) for _ in several} for choice, several in found.items()}
     matter = set()
     for a, b in itertools.combinations(reached, 2):
         differ = [i for i, (x, y) in enumerate(zip(a, b, strict=True)) if x != y]
@@ -147,7 +151,7 @@ def _stating(c: Candidate, known: Container[str]) -> Candidate:
     return replace(c, settings=replace(c.settings, defaulted=left), options=stated)
 
 
-def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str, object], laws: Laws) -> list[Candidate]:
+def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str, object]) -> list[Candidate]:
     """Return the candidates of one variant: one for every meaning of its integral dial that the card takes."""
     known = variant.equation.settings
     dials = {match_name(k, known) or k: v for k, v in dials.items()}
@@ -158,7 +162,7 @@ def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str
         values = {**dials, name: quantity} if name in dials else dials
         with contextlib.suppress(SettingError):  # out of range, unknown, or no controller
             settings = variant.card.settings({**ranges, **variant.chosen, **values})
-            found.append(Candidate(settings, values, about or in_words(settings, quantity), way, laws.number(settings)))
+            found.append(Candidate(settings, values, about or in_words(settings, quantity), way, response_of(settings)))
 
     number = bare(dials.get(name))
     if number is None or number in off_values(known[name]):
