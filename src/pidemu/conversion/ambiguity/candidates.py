@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -156,22 +156,17 @@ def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str
     known = variant.equation.settings
     dials = {match_name(k, known) or k: v for k, v in dials.items()}
     name = next((n for n, s in known.items() if Role(s.sets) is Role.INTEGRAL), "")
-    found: list[Candidate] = []
 
-    def add(way: int, quantity: object, about: str = "") -> None:
+    def read(way: int, quantity: object, about: str = "") -> Iterator[Candidate]:
         values = {**dials, name: quantity} if name in dials else dials
         with contextlib.suppress(SettingError):  # out of range, unknown, or no controller
             settings = variant.card.settings({**ranges, **variant.chosen, **values})
-            found.append(Candidate(settings, values, about or in_words(settings, quantity), way, response_of(settings)))
+            yield Candidate(settings, values, about or in_words(settings, quantity), way, response_of(settings))
 
     number = bare(dials.get(name))
     if number is None or number in off_values(known[name]):
-        add(0, dials.get(name))
-        return found
+        return list(read(0, dials.get(name)))
     units = possible_units(parse_unit(known[name].unit), variant.equation.form)
-    for way, unit in enumerate(units):
-        add(way, f"{written(dials[name])} {unit}")
+    found = [c for way, unit in enumerate(units) for c in read(way, f"{written(dials[name])} {unit}")]
     rates = as_reset_rates(name, number, units, found[0].settings) if found else []
-    for way, (quantity, about) in enumerate(rates, start=len(units)):
-        add(way, quantity, about)
-    return found
+    return [*found, *(c for way, rate in enumerate(rates, start=len(units)) for c in read(way, *rate))]
