@@ -17,7 +17,7 @@ SLOW: Final = (
     "conversion/test_low_frequency.py", "conversion/test_matches.py", "conversion/test_options.py", "conversion/test_policy.py",
     "conversion/test_policy_figures.py", "conversion/test_policy_properties.py", "conversion/test_policy_questions.py",
     "conversion/test_refusals.py", "conversion/test_rockwell_units.py", "conversion/test_roundtrip.py",
-    "conversion/test_spans.py", "conversion/test_symbolic.py", "conversion/test_verify.py", "conversion/test_wrong_rules.py",
+    "conversion/test_solver.py", "conversion/test_spans.py", "conversion/test_symbolic.py", "conversion/test_verify.py", "conversion/test_wrong_rules.py",
     "cutover/test_bench_check.py", "cutover/test_every_card.py", "fleet", "simulation/test_closed.py",
     "simulation/test_figures.py", "simulation/test_simulation.py", "matrix", "real/test_advanced_pid.py", "real/test_king.py",
     "real/test_limpid.py", "real/test_listing.py", "real/test_pid2.py", "records", "report", "program/test_programs.py",
