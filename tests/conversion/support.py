@@ -12,7 +12,7 @@ from pidemu.arrays import Floats as Floats  # noqa: PLC0414  # the tests take it
 from pidemu.card.load import Card
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.settings.settings import Settings, limits
 from pidemu.units import Role
 from tests.helpers import WIDE, settings_of

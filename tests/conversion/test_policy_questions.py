@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu.conversion.refused import ConversionRefusedError, QuestionError
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import PidemuError, ScanError, SettingError
 from pidemu.formatting import json_safe

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 from tests.conversion.support import needed, settings_that_act

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.conversion import verify as module
+from pidemu.conversion.changes import DIAL, FIGURE
 from pidemu.errors import CertificateError, PidemuError
 from tests.cli.helpers import said, strict_json, with_another_filter
 from tests.conversion.commands import CONVERSIONS, OTHERS
@@ -341,7 +341,7 @@ def test_no_file_makes_a_traceback(places: list[tuple[Any, ...]], values: list[A
 
 
 def test_tolerances_are_those_that_the_command_states() -> None:
-    assert (module.DIAL, module.FIGURE) == (1e-6, 1e-4)
+    assert (DIAL, FIGURE) == (1e-6, 1e-4)
     text = " ".join(said("verify", "--help").out.split())
     assert "dials (to 1e-6)" in text
     assert "figures (to 1e-4" in text

@@ -7,7 +7,7 @@ from pidemu.conversion.document import question_document
 from pidemu.conversion.questions import Question
 from pidemu.conversion.refused import QuestionError
 from pidemu.conversion.result import Conversion
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.settings.settings import Settings
 
 

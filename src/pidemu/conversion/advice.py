@@ -83,7 +83,7 @@ def _lag(c: Conversion) -> str:
         return ""
     work = c.ranking[0].solver
     assert work is not None
-    without = percent(work.continuous_deviation(replace(c.settings, lag=0.0)))
+    without = percent(work.yardstick.continuous_deviation(replace(c.settings, lag=0.0)))
     return (
         f"The old controller filters PV, the new block cannot: put a first-order lag of {number(c.settings.lag)} s on PV in front "
         f"of it, as the figures suppose; without it the two differ by {without} in the loop band"

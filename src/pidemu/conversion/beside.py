@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from pidemu.certificate.figures import number, percent
 from pidemu.certificate.models import EXACT, LEAST_PHASE, RANK
 from pidemu.conversion.command import set_words
-from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match.no_match import NoMatchError
 from pidemu.conversion.match_method import Aim
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import DIGITS
@@ -127,8 +127,8 @@ def _own_numbers(c: Conversion) -> Iterator[Beside]:
     if c.match != "exact" or work is None or c.request.match is not None:
         return
     with suppress(NoMatchError, PidemuError):
-        own, _ = work.settings(Aim("same-numbers"))
-        off = work.continuous_deviation(own)
+        own = work.settings(Aim("same-numbers")).settings
+        off = work.yardstick.continuous_deviation(own)
         if _is_another(c.unrounded, own) and EXACT < off < _NEAR:
             text = f"the source's own numbers: {dials_text(own)}, {percent(off)}"
             yield Beside("same-numbers", text, own, "--match same-numbers")
@@ -140,9 +140,9 @@ def _matched(c: Conversion) -> Iterator[Beside]:
     if c.match != "same-numbers" or work is None or c.request.match is not None:
         return
     with suppress(NoMatchError, PidemuError):
-        found, _ = work.settings(Aim("low-frequency"))
+        found = work.settings(Aim("low-frequency")).settings
         if _is_another(c.unrounded, found):
-            off = percent(work.continuous_deviation(found))
+            off = percent(work.yardstick.continuous_deviation(found))
             yield Beside("matched", f"matched at low frequencies: {dials_text(found)}, {off}", found, "--match low-frequency")
 
 

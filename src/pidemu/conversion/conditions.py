@@ -212,7 +212,7 @@ def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], 
             work = c.ranking[0].solver
             if work is None:
                 return ""
-            return f"{when} the two differ by {percent(work.continuous_deviation(varied))} in the loop band"
+            return f"{when} the two differ by {percent(work.yardstick.continuous_deviation(varied))} in the loop band"
         from pidemu.conversion.convert import again
 
         options, digits = dict(c.settings.options), c.request.digits or DIGITS

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.card.model.card_file import default_scan
 from pidemu.certificate.models import Rounded
 from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.asking import (
@@ -17,18 +16,14 @@ from pidemu.conversion.asking import (
     ask,
     missing_ranges,
     mode_is_open,
-    mode_question,
     scale_questions,
     taken_for_granted,
 )
 from pidemu.conversion.certify import full_certificate
-from pidemu.conversion.command import set_words
-from pidemu.conversion.match import NoMatchError
+from pidemu.conversion.match.moments import check_optimiser
+from pidemu.conversion.match.no_match import REFUSALS
 from pidemu.conversion.match_method import Aim, read_aim
-from pidemu.conversion.modes import MODES, Mode
-from pidemu.conversion.moments import check_optimiser
-from pidemu.conversion.options import Attempt, attempts
-from pidemu.conversion.questions import Question
+from pidemu.conversion.options import Attempt
 from pidemu.conversion.refusals import (
     forgotten_output,
     refuse_positive_feedback,
@@ -40,22 +35,16 @@ from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import Request, read_request
 from pidemu.conversion.result import Conversion, Textbook
 from pidemu.conversion.rounding import rounded
-from pidemu.conversion.solve import Solver
-from pidemu.conversion.spans import rescaling
-from pidemu.conversion.target import Target, is_computed
+from pidemu.conversion.search import make_search, nearest_attempt
+from pidemu.conversion.solver.closed_forms import textbook
+from pidemu.conversion.solver.solver import Solver
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ScanError, SettingError
-from pidemu.law.exact import as_typed
-from pidemu.settings.action import Action, switch_position
 from pidemu.settings.ranges import RangeGiven
-from pidemu.settings.settings import Settings, Value, limits
-from pidemu.units import Role, from_canonical, parse_unit
+from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:
     from pidemu.process.process import Process
-
-_PAIRED = (None, "exact", "same-numbers")
-"""Matches for which a filter of the measurement is carried over, not absorbed into the dials."""
 
 
 def convert(
@@ -181,24 +170,24 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     scales = scale_questions(source, request)
     ask([*action_questions(source, request), *open_questions, *scales], source, card, request)
     refuse_positive_feedback(source, request)
-    work = _Work(source, card, request, aim)
-    ranking = work.ranking()
-    modes = work.mode_question() if mode_is_open(source, ranking, request) else []
+    search = make_search(source, card, request, aim)
+    ranking = search.ranking()
+    modes = search.mode_question() if mode_is_open(source, ranking, request) else []
     if modes:
         ask(modes, source, card, request)
         request = replace(request, mode="auto")
-        ranking = work.ranking("auto")
+        ranking = search.ranking("auto")
     best, refusal, settings = ranking[0], "", ranking[0].settings
     if settings is None:
-        best, refusal, settings = _nearest(ranking)
-        refusal += work.other_options()
+        best, refusal, settings = nearest_attempt(ranking)
+        refusal += search.other_options()
         if settings is None:
             raise ConversionRefusedError(refusal)
     ranges = missing_ranges(source, settings)
     ask(ranges, source, card, request)
     opens = (*opens, *taken_for_granted([*scales, *modes, *ranges], source))
     refuse_two_intervals(source, settings, request)
-    shift = "" if refusal else forgotten_output(source, settings, request, work.factor)
+    shift = "" if refusal else forgotten_output(source, settings, request, search.factor)
     conversion = _concluded(best, settings, refusal, source, request, ranking, emulate=emulate)
     conversion = replace(conversion, opens=opens)
     if shift:
@@ -236,97 +225,40 @@ def _concluded(
     emulate: bool,
 ) -> Conversion:
     """Return the conversion with its certificate, about the dials as they are printed."""
-    work = best.solver
+    work, found = best.solver, best.found
     assert work is not None  # there are settings
+    assert found is not None
     unrounded = settings
     dials: tuple[Rounded, ...] = ()
     if request.digits is not None:
         settings, dials = rounded(settings, request.digits, request.given)
     stated = None if request.limits is None else source.own_ranges.op.limits_in_percent(request.limits)
-    certificate = full_certificate(work, settings, unrounded if dials else settings, limits=stated, emulate=emulate)
+    certificate = full_certificate(
+        work.yardstick,
+        settings,
+        unrounded if dials else settings,
+        compensated=found.compensated,
+        limits=stated,
+        emulate=emulate,
+    )
     if dials:
         certificate = replace(certificate, dials=dials)
     return Conversion(
         source=source,
         settings=settings,
         unrounded=unrounded,
-        match=best.match,
+        match=found.match,
         certificate=certificate,
         textbook=_textbook(work),
         warnings=(),
         refusal=refusal,
         chosen=_chosen(settings, request),
         ranking=ranking,
-        factor=work.factor,
+        factor=work.yardstick.factor,
         scan=request.scan,
         process=request.process,
         request=request,
     )
-
-
-def _measurement_lag(source: Settings, request: Request) -> float | None:
-    """Return the time of the source's filter on the measurement [s]: of a share per scan that which the decimals as typed make."""
-    h = request.scan[0] if request.scan else None
-    lag = source.algorithm(scan=h).measurement.filter
-    if lag is None or lag.factor is None:
-        return None if lag is None else lag.time
-    share = as_typed(lag.factor)
-    return float(as_typed(default_scan(source.equation) if h is None else h) * (1 - share) / share)
-
-
-class _Work:
-    """One conversion: its source, card and request, from which solvers for any choice of the options are made."""
-
-    def __init__(self, source: Settings, card: Card, request: Request, aim: Aim) -> None:
-        self.source = source
-        self.card = card
-        self.request = request
-        self.aim = aim
-        self.factor = float(rescaling(source, request.to_pv_range, request.to_op_range).factor)
-        self.fixed = {**_shared(source, card), **request.given}
-        self.taken = {**(source.options if source.card.id == card.id else {}), **request.options}
-        self.source_lag = _measurement_lag(source, request) if self.aim.match in _PAIRED else None
-        if request.scan is not None:
-            source.law(request.scan[0])  # refuses an interval at which a filter of the source is unstable
-
-    def ranking(self, mode: Mode | None = None, taken: Mapping[str, object] | None = None) -> tuple[Attempt, ...]:
-        """Return every choice of the options, the best first."""
-        request = self.request if mode is None else replace(self.request, mode=mode)
-
-        def solver(named: Mapping[str, object]) -> Solver:
-            source = self.source
-            ranges = (request.to_pv_range or source.pv_range, request.to_op_range or source.op_range)
-            scan = request.declared[1] if request.declared else None
-            goal = Target(self.card, named, self.fixed, *ranges, request.pace[1], scan, self.source_lag)
-            goal.reject_missing()
-            sign = -1 if _is_negative(source, goal) or _becomes_negative(source, self.card, request.action) else 1
-            return Solver(
-                source, goal, sign * self.factor, request.scan, request.process, compensate=request.compensate, mode=request.mode
-            )
-
-        return attempts(self.card, self.taken if taken is None else taken, solver, self.aim, wanted=request.given)
-
-    def mode_question(self) -> list[Question]:
-        """Return the question for the mode, where the answers lead to other settings."""
-        best = [self.ranking(mode)[0].settings for mode in MODES]
-        if best[0] == best[1]:
-            return []
-        return [mode_question(self.source)]
-
-    def other_options(self) -> str:
-        """Return which options, instead of those that the user chose, would do; empty where none would."""
-        if not self.request.options:
-            return ""
-        attempt = self.ranking(taken={})[0]
-        if attempt.settings is None:
-            return ""
-        chosen = attempt.settings.options
-        words = {
-            n: chosen[n]
-            for n in chosen
-            if n in attempt.changed or (n in self.taken and str(self.taken[n]).casefold() != chosen[n].casefold())
-        }
-        return f"; other options would do: {set_words(words)}: {attempt.verdict}"
 
 
 def _paced(source: Settings, request: Request) -> Settings:
@@ -361,50 +293,10 @@ def _aim(match: str | None, process: Process | None) -> Aim:
     return aim
 
 
-def _nearest(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | None]:
-    """Return what is nearest to the source with the options as delivered or chosen by the user, and why the target refuses."""
-    first = min(ranking, key=lambda a: len(a.changed))
-    if first.solver is None or first.error is None or isinstance(first.error, ScanError):
-        raise first.error or ConversionRefusedError("there are no options left to try")
-    settings, refusal = first.solver.refused(first.error)
-    return replace(first, match="constrained"), refusal, settings
-
-
-def _is_negative(source: Settings, target: Target) -> bool:
-    """Whether the source has negative gains only, and the target no place for them: then the action changes instead."""
-    a, gain = source.algorithm(), target.dial(Role.GAIN)
-    return max(a.kp, a.ki, a.kd) <= 0 > min(a.kp, a.ki, a.kd) and gain is not None and limits(gain[1])[0] >= 0
-
-
-def _becomes_negative(source: Settings, target: Card, action: Action | None) -> bool:
-    """Whether the source's switch stands at direct, and the target has none, so that its gain carries the sign."""
-    switched = not source.equation.action.fixed and target.data.action.fixed
-    return switched and action is not None and switch_position(source, action) == "direct"
-
-
-def _shared(source: Settings, target: Card) -> dict[str, object]:
-    """Return what stays as it is within one card: whatever a conversion does not compute, and settings that many loops share."""
-    if source.card.id != target.id:
-        return {}
-    return {
-        n: _as_it_runs(v, source)
-        for n, v in source.items()
-        if v.active and (v.setting.scope == "module" or not is_computed(source.equation, n, v.role))
-    }
-
-
-def _as_it_runs(v: Value, source: Settings) -> float:
-    """Return a dial that is kept, for a controller that is executed at the interval it computes with: times grow by the pace."""
-    if source.pace == 1 or v.off or parse_unit(v.unit).scans:
-        return v.value
-    power = 1 if v.role in (Role.FILTER_TIME, Role.TRACKING_TIME) else -1 if v.role in (Role.OUTPUT_RATE, Role.SETPOINT_RATE) else 0
-    return from_canonical(v.role, v.canonical * source.pace**power, parse_unit(v.unit), source.spans) if power else v.value
-
-
 def _textbook(solver: Solver) -> Textbook:
     """Return what the textbook rule gives, with its figures."""
     try:
-        book = solver.forms.textbook()
-        return Textbook(book, solver.certify(book))
-    except (NoMatchError, SettingError) as error:
+        book = textbook(solver.pair).settings
+        return Textbook(book, solver.yardstick.certify(book))
+    except REFUSALS as error:
         return Textbook(None, None, str(error))

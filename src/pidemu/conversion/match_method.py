@@ -10,7 +10,7 @@ from pidemu.errors import SettingError, suggest
 
 Match = Literal["exact", "same-numbers", "low-frequency", "textbook", "frequency", "loop", "constrained"]
 MATCHES: Final[tuple[Match, ...]] = get_args(Match)
-"""Matches a user may ask for; which of them is the default, `pidemu.conversion.solve` says."""
+"""Matches a user may ask for; which of them is the default, `pidemu.conversion.solver.solver` says."""
 
 _UNITS: Final = {"rad/s": 1.0, "rad/min": 1 / 60, "rad/h": 1 / 3600, "mhz": 2e-3 * math.pi, "hz": 2 * math.pi}
 """Frequencies in rad/s."""

@@ -15,7 +15,7 @@ from pidemu.certificate.noise import noise_gain
 from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.modes import in_mode, looked_at
 from pidemu.conversion.rounding import rounding_error
-from pidemu.conversion.solve import Solver
+from pidemu.conversion.solver.yardstick import Yardstick
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 
@@ -130,13 +130,13 @@ _WORDS: Final = {
 }
 
 
-def merit(work: Solver, settings: Settings, certificate: Certificate, changed: int, unused: int) -> Merit:
+def merit(judge: Yardstick, settings: Settings, certificate: Certificate, changed: int, unused: int) -> Merit:
     """Return the merit of one choice of the options.
 
     Parameters
     ----------
-    work : Solver
-        What solved it.
+    judge : Yardstick
+        What it is held against.
     settings : Settings
         What it found.
     certificate : Certificate
@@ -144,22 +144,22 @@ def merit(work: Solver, settings: Settings, certificate: Certificate, changed: i
     changed, unused : int
         How many options are not as delivered, and how many given dials are not in use.
     """
-    source, a, b = work.source, work.source.algorithm(), settings.algorithm()
+    source, a, b = judge.source, judge.source.algorithm(), settings.algorithm()
     exact = certificate.feedback.is_exact
-    ratio = _noise(work, settings)
-    modes = looked_at(work.mode, source, settings)
+    ratio = _noise(judge, settings)
+    modes = looked_at(judge.mode, source, settings)
     return Merit(
         unused=unused,
         setpoint=max(setpoint_class(in_mode(a, m), in_mode(b, m)) for m in modes),
         nonlinear=a.beyond_the_law != b.beyond_the_law,
         forgets=forgets(source, settings),
         noisy=not exact and ratio > _NOISY,
-        verdict=_class(work, certificate),
+        verdict=_class(judge, certificate),
         form=0
         if source.equation.form is settings.equation.form
         else _DISTANCE.get((source.equation.form, settings.equation.form), 3),
         by_number=not a.ki and settings.equation.integral.on != "none",
-        dials=dials_that_differ(source, settings, work.factor),
+        dials=dials_that_differ(source, settings, judge.factor),
         rules=rules_differ(source, settings),
         assumed=_assumed(settings),
         windup=a.integral.windup.scheme != b.integral.windup.scheme,
@@ -240,27 +240,27 @@ def _numbers(settings: Settings) -> list[float]:
     return found
 
 
-def _class(work: Solver, c: Certificate) -> int:
+def _class(judge: Yardstick, c: Certificate) -> int:
     """Return the verdict's class; nearly exact counts as exact where the source's filter is only assumed or inferred.
 
     Where the scans are made up for, the laws at these are what counts.
     """
-    if work.compensates and c.feedback_at_scan is not None and not c.feedback_at_scan.is_exact:
+    if judge.compensates and c.feedback_at_scan is not None and not c.feedback_at_scan.is_exact:
         return RANK["approximate"] + (c.feedback_at_scan.loop_band.max_deviation > _FAR)
     if c.verdict != "approximate" or c.feedback.is_exact:
         same = c.feedback.is_exact and c.setpoint.is_exact and (c.setpoint_in_cascade is None or c.setpoint_in_cascade.is_exact)
         return RANK["exact" if same else "exact-feedback"]
     off = c.feedback.loop_band.max_deviation
-    known = not work.source.algorithm().kd or filter_status(work.source) in (Status.DOCUMENTED, Status.MEASURED)
+    known = not judge.source.algorithm().kd or filter_status(judge.source) in (Status.DOCUMENTED, Status.MEASURED)
     if off < _NEAR and not known:
         return RANK["exact" if c.setpoint.loop_band.max_deviation < _NEAR else "exact-feedback"]
     return RANK["approximate"] + (off > _FAR)
 
 
-def _noise(work: Solver, settings: Settings) -> float:
+def _noise(judge: Yardstick, settings: Settings) -> float:
     """Return the noise gain per source's; 1 where they cannot be compared, as the source has no filter."""
-    old, new = work.scans or (None, None)
-    before = noise_gain(work.source, old) * abs(work.factor)
+    old, new = judge.scans or (None, None)
+    before = noise_gain(judge.source, old) * abs(judge.factor)
     if math.isinf(before):
         return 1.0
     return noise_gain(settings, new) / before if before else math.inf

@@ -10,11 +10,12 @@ from typing import Any
 from pidemu.card.load import Card
 from pidemu.card.model.card_file import Equation
 from pidemu.certificate.models import Certificate, Verdict
-from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.match_method import Aim, Match
+from pidemu.conversion.match.no_match import NoMatchError
+from pidemu.conversion.match_method import Aim
 from pidemu.conversion.merit import Merit, merit, unused
-from pidemu.conversion.solve import Solver
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.solver.found import Found
+from pidemu.conversion.solver.solver import Solver
+from pidemu.conversion.target.computed import is_computed
 from pidemu.errors import PidemuError
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
@@ -30,10 +31,8 @@ class Attempt:
         The options that are not as the card delivers them.
     solver : Solver or None
         What solved it; ``None`` where the given dials do not go with these options.
-    settings : Settings or None
-        The target's settings; ``None`` where it refuses.
-    match : str
-        How they were found.
+    found : Found or None
+        The target's settings and how they were found; ``None`` where it refuses.
     certificate : Certificate or None
         The linear figures.
     merit : Merit or None
@@ -44,11 +43,15 @@ class Attempt:
 
     changed: Mapping[str, str]
     solver: Solver | None
-    settings: Settings | None
-    match: Match
+    found: Found | None
     certificate: Certificate | None
     merit: Merit | None = None
     error: Exception | None = None
+
+    @property
+    def settings(self) -> Settings | None:
+        """The target's settings; ``None`` where it refuses."""
+        return None if self.found is None else self.found.settings
 
     @property
     def verdict(self) -> Verdict:
@@ -134,8 +137,9 @@ def _attempt(
     work = None
     try:
         work = solver(options)
-        settings, how = work.settings(aim)
-        certificate = work.certify(settings)
-        return Attempt(changed, work, settings, how, certificate, merit(work, settings, certificate, len(changed), idle))
+        found = work.settings(aim)
+        certificate = work.yardstick.certify(found.settings)
+        judged = merit(work.yardstick, found.settings, certificate, len(changed), idle)
+        return Attempt(changed, work, found, certificate, judged)
     except (NoMatchError, PidemuError) as error:
-        return Attempt(changed, work, None, "constrained", None, error=error)
+        return Attempt(changed, work, None, None, error=error)

@@ -12,7 +12,7 @@ from pidemu.certificate.figures import decibels, degrees, emulation_line, kick_l
 from pidemu.certificate.models import EXACT
 from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 from pidemu.conversion.conditions import Condition
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.settings.settings import Settings, Value
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.request import DIGITS, Request
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.spans import ranges_needed
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.formatting import json_safe
 from pidemu.matrix.typical import held_dials, typical_settings
 from pidemu.settings.ranges import RANGES, SignalRange

@@ -13,7 +13,7 @@ from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
 from pidemu.checks.runs import working
-from pidemu.conversion.target import is_computed
+from pidemu.conversion.target.computed import is_computed
 from pidemu.errors import UndefinedError
 from pidemu.settings.settings import Settings, limits, off_values
 from pidemu.units import Dimension, Role, Spans, from_canonical, parse_unit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -24,20 +24,21 @@ _FREQUENCIES: Final = np.geomspace(1e-7, 1e4, 133)
 _TERMS: Final = {Role.GAIN: "proportional", Role.INTEGRAL: "integral", Role.DERIVATIVE: "derivative"}
 
 
-class Laws:
-    """Tells laws for measurement apart, by number."""
+def response_of(settings: Settings) -> Complexes:
+    """Return what tells the law of settings from others."""
+    return settings.law().response(_FREQUENCIES)
 
-    def __init__(self) -> None:
-        self.seen: list[Complexes] = []
 
-    def number(self, settings: Settings) -> int:
-        """Return the number of the first law seen that agrees over all frequencies."""
-        response = settings.law().response(_FREQUENCIES)
-        for k, known in enumerate(self.seen):
-            if np.allclose(response, known, rtol=EXACT, atol=0.0):
-                return k
-        self.seen.append(response)
-        return len(self.seen) - 1
+def law_numbers(responses: Iterable[Complexes]) -> list[int]:
+    """Return a number for each law: that of the first one that agrees with it over all frequencies."""
+    known: list[Complexes] = []
+    numbers = []
+    for response in responses:
+        number = next((k for k, x in enumerate(known) if np.allclose(response, x, rtol=EXACT, atol=0.0)), len(known))
+        if number == len(known):
+            known.append(response)
+        numbers.append(number)
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ class Candidate:
         What the integral dial is taken for, in words.
     way : int
         Which meaning it is; 0: the card's own unit.
-    law : int
-        The number of its law.
+    response : array of complex
+        What tells its law from others.
     options : dict
         The options that it states: given, open, or not at their default.
     """
@@ -64,7 +65,7 @@ class Candidate:
     values: Mapping[str, object]
     about: str
     way: int
-    law: int
+    response: Complexes = field(repr=False, compare=False)
     options: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -84,7 +85,7 @@ class Candidate:
         ]
 
 
-def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[Candidate]:
+def candidates_of(card: Card, given: Mapping[str, object]) -> list[Candidate]:
     """Return what settings may mean on one card.
 
     Parameters
@@ -93,8 +94,6 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
         The card.
     given : mapping
         Settings, options and ranges by name, as for `Card.settings`.
-    laws : Laws
-        Numbers the laws.
 
     Returns
     -------
@@ -110,7 +109,7 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
     for choice in itertools.product(*(card.options[name] for name in open_options)):
         with contextlib.suppress(SettingError, CardError):  # choices that do not go together
             variant = card.variant({**stated, **dict(zip(open_options, choice, strict=True))})
-            found[choice] = _meanings(variant, dials, ranges, laws)
+            found[choice] = _meanings(variant, dials, ranges)
     if any(_at_work(c.settings) for several in found.values() for c in several):
         found = {choice: [c for c in several if _at_work(c.settings)] for choice, several in found.items()}
     found = {choice: several for choice, several in found.items() if several}
@@ -124,7 +123,8 @@ def candidates_of(card: Card, given: Mapping[str, object], laws: Laws) -> list[C
 
 def _that_matter(found: Mapping[tuple[str, ...], Sequence[Candidate]]) -> list[int]:
     """Return which options matter: changed alone, they lead to other laws."""
-    reached = {choice: {c.law for c in several} for choice, several in found.items()}
+    numbers = iter(law_numbers(c.response for several in found.values() for c in several))
+    reached = {choice: {next(numbers) for _ in several} for choice, several in found.items()}
     matter = set()
     for a, b in itertools.combinations(reached, 2):
         differ = [i for i, (x, y) in enumerate(zip(a, b, strict=True)) if x != y]
@@ -147,27 +147,22 @@ def _stating(c: Candidate, known: Container[str]) -> Candidate:
     return replace(c, settings=replace(c.settings, defaulted=left), options=stated)
 
 
-def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str, object], laws: Laws) -> list[Candidate]:
+def _meanings(variant: Variant, dials: Mapping[str, object], ranges: Mapping[str, object]) -> list[Candidate]:
     """Return the candidates of one variant: one for every meaning of its integral dial that the card takes."""
     known = variant.equation.settings
     dials = {match_name(k, known) or k: v for k, v in dials.items()}
     name = next((n for n, s in known.items() if Role(s.sets) is Role.INTEGRAL), "")
-    found: list[Candidate] = []
 
-    def add(way: int, quantity: object, about: str = "") -> None:
+    def read(way: int, quantity: object, about: str = "") -> Iterator[Candidate]:
         values = {**dials, name: quantity} if name in dials else dials
         with contextlib.suppress(SettingError):  # out of range, unknown, or no controller
             settings = variant.card.settings({**ranges, **variant.chosen, **values})
-            found.append(Candidate(settings, values, about or in_words(settings, quantity), way, laws.number(settings)))
+            yield Candidate(settings, values, about or in_words(settings, quantity), way, response_of(settings))
 
     number = bare(dials.get(name))
     if number is None or number in off_values(known[name]):
-        add(0, dials.get(name))
-        return found
+        return list(read(0, dials.get(name)))
     units = possible_units(parse_unit(known[name].unit), variant.equation.form)
-    for way, unit in enumerate(units):
-        add(way, f"{written(dials[name])} {unit}")
+    found = [c for way, unit in enumerate(units) for c in read(way, f"{written(dials[name])} {unit}")]
     rates = as_reset_rates(name, number, units, found[0].settings) if found else []
-    for way, (quantity, about) in enumerate(rates, start=len(units)):
-        add(way, quantity, about)
-    return found
+    return [*found, *(c for way, rate in enumerate(rates, start=len(units)) for c in read(way, *rate))]

@@ -18,7 +18,7 @@ from pidemu.card.library import cards, load_card
 from pidemu.card.load import Card
 from pidemu.card.model.base import Form
 from pidemu.certificate.linear import bands, compare
-from pidemu.conversion.ambiguity.candidates import Laws, candidates_of
+from pidemu.conversion.ambiguity.candidates import candidates_of, law_numbers, response_of
 from pidemu.errors import CardNotFoundError, PidemuError, SettingError, suggest
 from pidemu.settings.settings import Settings
 
@@ -114,16 +114,16 @@ def readings(
     """
     given = {**(values or {}), **named}
     named_cards = _cards_named(word, vendors)
-    laws = Laws()
-    found = [r for card in named_cards for r in candidates_of(card, given, laws)]
+    found = [r for card in named_cards for r in candidates_of(card, given)]
     if not found:
         raise SettingError(_why_none(word, named_cards, given))
     merged: dict[int, Reading] = {}
-    for r in sorted(found, key=lambda r: r.way):
+    numbered = zip(found, law_numbers(r.response for r in found), strict=True)
+    for r, law in sorted(numbered, key=lambda pair: pair[0].way):
         words = [word if _is_file(word) else r.settings.card.id, *r.words, *(f"--vendors={folder}" for folder in vendors)]
-        reading = merged.setdefault(r.law, Reading(r.settings, r.text, command_line(words)))
+        reading = merged.setdefault(law, Reading(r.settings, r.text, command_line(words)))
         if r.text not in (reading.text, *reading.alike):
-            merged[r.law] = replace(reading, alike=(*reading.alike, r.text))
+            merged[law] = replace(reading, alike=(*reading.alike, r.text))
     return tuple(merged.values())
 
 
@@ -174,7 +174,7 @@ def _why_none(word: str, named: Sequence[Card], given: Mapping[str, object]) -> 
             )
             continue
         try:
-            Laws().number(card.settings(given))
+            response_of(card.settings(given))
         except PidemuError as error:
             faults.append(str(error))
     reasons = "\n".join(faults)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,10 @@ import numpy as np
 
 from pidemu.arrays import Floats
 from pidemu.certificate.linear import bands
-from pidemu.conversion.match import NoMatchError
-from pidemu.conversion.target import Numbers, Target
+from pidemu.conversion.match.no_match import NoMatchError
+from pidemu.conversion.target.filter import TargetFilter
+from pidemu.conversion.target.numbers import Numbers
+from pidemu.conversion.target.target import Target
 from pidemu.errors import PidemuError
 from pidemu.law.law import Law
 
@@ -43,24 +45,37 @@ class MomentProblem:
         The source's law, scaled; discrete where the scan intervals count.
     target : Target
         The target.
-    numbers : callable
-        From moments to the target's numbers; raises `NoMatchError` where there are none.
+    filter : TargetFilter
+        The target's filter, with the value that it has.
+    closed_form : callable
+        From moments and filter to the target's numbers; raises `NoMatchError` where there are none.
     scan : float or None
         The target's scan interval [s], where it counts.
     """
 
     wanted: Law
     target: Target
-    numbers: Callable[[Sequence[float]], Numbers]
+    filter: TargetFilter
+    closed_form: Callable[[Sequence[float], TargetFilter], Numbers]
     scan: float | None
+
+    def numbers(self, moments: Sequence[float]) -> Numbers:
+        """Return the target's numbers for these moments."""
+        return self.closed_form(moments, self.filter)
 
     def law(self, moments: Sequence[float]) -> Law:
         """Return the target's law with the numbers of these moments."""
-        return Law(self.target.algorithm_of(self.numbers(moments)), self.scan)
+        return Law(self.target.algorithm_of(self.numbers(moments), self.filter), self.scan)
+
+    def filtered_like(self, Tf: float, moments: Sequence[float]) -> MomentProblem:
+        """Return the problem with the filter fixed nearest to a time [s], for the numbers of these moments."""
+        return replace(self, filter=self.filter.nearest_to(Tf, self.target.filter_base(self.numbers(moments))))
 
 
-Way = Callable[[MomentProblem, Sequence[float]], Sequence[float]]
-"""A way to solve: from the problem and the source's moments to moments to ask the closed form with."""
+Asked = tuple[MomentProblem, Sequence[float]]
+"""Moments to ask the closed form with, and the problem that they solve: its filter may be another one than at first."""
+Way = Callable[[MomentProblem, Sequence[float]], Asked]
+"""A way to solve: from the problem and the source's moments."""
 
 
 def meet(problem: MomentProblem, terms: Sequence[bool] = (True, True, True)) -> Sequence[float]:
