@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import functools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import FrozenInstanceError, dataclass, field
 from pathlib import Path
@@ -151,3 +152,33 @@ def test_nothing_in_a_conversion_is_assigned_to_after_it_was_made() -> None:
     files = sorted(Path(package.__file__).parents[1].rglob("*.py"))
     assert len(files) > 40
     assert [(file.name, t.lineno) for file in files for t in assignments(ast.parse(file.read_text("utf-8")))] == []
+
+
+def test_settings_as_far_off_as_no_controller_at_all_are_not_offered() -> None:
+    source = pidemu.load_card("emerson/deltav").settings(STRUCTURE=1, GAIN=1, RESET=math.inf, RATE=3, PV_FTIME=2)
+    with pytest.raises(pidemu.ConversionRefusedError) as refused:
+        pidemu.convert(source, "oscat/ft-pid", mode="auto", emulate=False, assume=True)
+    assert refused.value.nearest is None
+    assert str(refused.value).endswith("; no settings of it come near")
+
+
+@pytest.mark.parametrize("process", [None, pidemu.Process.from_lags(gain=0.3, lags=[60.0], delay=5.0)])
+def test_the_nearest_settings_are_sought_with_the_filter_that_they_are_given(process: pidemu.Process | None) -> None:
+    # they were sought with the filter that a match before had left, and were farther off than no controller at all
+    source = pidemu.load_card("modelica/limpid").settings(
+        controllerType="PD", METHOD="continuous", k=20, Td=160, wp=0.5, wd=0, Nd=3
+    )
+    with pytest.raises(pidemu.ConversionRefusedError) as refused:
+        pidemu.convert(
+            source,
+            "advanced-pid/advanced-pid",
+            match="exact",
+            scan=(0.07, 0.1),
+            process=process,
+            compensate=True,
+            emulate=False,
+            assume=True,
+        )
+    nearest = refused.value.nearest
+    assert nearest is not None
+    assert nearest.certificate.feedback.loop_band.max_deviation < 0.6

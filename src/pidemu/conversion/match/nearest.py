@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from pidemu.card.model.base import Form
 from pidemu.certificate.linear import bands
-from pidemu.conversion.target.filter import TargetFilter
 from pidemu.conversion.target.numbers import Numbers
 from pidemu.conversion.target.target import Target
 from pidemu.law.law import Law, at_frequencies, paths
@@ -30,7 +29,7 @@ _MARGIN: Final = 1e-9
 """Relative distance kept from a range's end, so that unit conversion does not step over it."""
 
 
-def nearest(law: Law, target: Target, filt: TargetFilter, factor: float, process: Process | None = None) -> Numbers | None:
+def nearest(law: Law, target: Target, factor: float, process: Process | None = None) -> Numbers | None:
     """Return numbers inside the target's ranges that minimise the largest deviation over the loop band.
 
     The low-frequency gain ``m0`` is kept as far as the ranges allow. The search is a grid in the logarithms of gain and derivative
@@ -41,9 +40,7 @@ def nearest(law: Law, target: Target, filt: TargetFilter, factor: float, process
     law : Law
         The source's law.
     target : Target
-        The target.
-    filt : TargetFilter
-        The target's filter, with the value that it has.
+        The target; the filter is its own, as the settings have it.
     factor : float
         What the source's gain is multiplied by for new signal ranges.
     process : Process, optional
@@ -79,7 +76,7 @@ def nearest(law: Law, target: Target, filt: TargetFilter, factor: float, process
         if not target.has_derivative:
             Td = np.zeros((1, 1))
         ki = _integral(m0, K, rates, target)
-        cost = np.where(_in_order(K, ki, Td, in_order), _cost(target, filt, sign * K, sign * ki, Td, w, wanted), np.inf)
+        cost = np.where(_in_order(K, ki, Td, in_order), _cost(target, sign * K, sign * ki, Td, w, wanted), np.inf)
         i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
         if best is None or cost[i, j] < best[0]:
             best = (float(cost[i, j]), float(K[i, 0]), float(np.broadcast_to(ki, cost.shape)[i, 0]), float(Td[0, j]))
@@ -141,11 +138,11 @@ def _integral(m0: float, K: Any, rates: tuple[float, float], target: Target) -> 
     return K * np.clip(abs(m0) / K, *rates)
 
 
-def _cost(target: Target, filt: TargetFilter, K: Any, ki: Any, Td: Any, w: Any, wanted: Any) -> npt.NDArray[np.float64]:
+def _cost(target: Target, K: Any, ki: Any, Td: Any, w: Any, wanted: Any) -> npt.NDArray[np.float64]:
     """Return the largest relative deviation over the frequencies, for every combination."""
     grid = [np.asarray(x, dtype=float)[..., None] for x in (K, ki, Td)]
     with np.errstate(all="ignore"):
-        a = target.algorithm_of(Numbers(grid[0], grid[1], grid[0] * grid[2]), filt)
+        a = target.algorithm_of(Numbers(grid[0], grid[1], grid[0] * grid[2]), target.filter)
         response = paths(a, at_frequencies(w))[0]
         deviation = np.max(np.abs(response / wanted - 1), axis=-1)
     result: npt.NDArray[np.float64] = np.where(np.isfinite(deviation), deviation, np.inf)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pidemu.conversion.match import exact as closed
 from pidemu.conversion.match import textbook as book
-from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, Refusal, tried_with, with_tried
+from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, Refusal
 from pidemu.conversion.match.terms import check_terms
 from pidemu.conversion.match_method import Match
 from pidemu.conversion.solver.found import Found
@@ -31,7 +31,7 @@ def by_closed_form(pair: Pair, match: Match | None) -> Found:
     if match == "low-frequency":
         found = low_frequency(pair, moments=True)
         if not keeps_the_moments(pair, found):
-            raise NoMatchError("no settings keep the moments: with these options the target lacks a term", tried=found.tried)
+            raise NoMatchError("no settings keep the moments: with these options the target lacks a term")
         return found
     try:
         return exact(pair)
@@ -41,7 +41,7 @@ def by_closed_form(pair: Pair, match: Match | None) -> Found:
             raise
     found = low_frequency_because(pair, why)
     if match == "exact" and found.match != "exact":
-        raise NoMatchError("its filter is fixed, and no settings give the same law", tried=found.tried)
+        raise NoMatchError("its filter is fixed, and no settings give the same law")
     return found
 
 
@@ -57,7 +57,7 @@ def low_frequency_because(pair: Pair, why: Refusal) -> Found:
         found = low_frequency(pair)
     except REFUSALS as refusal:
         if isinstance(why, NoMatchError) and why.fundamental:
-            raise with_tried(why, tried_with(refusal)) from None
+            raise why from None
         raise refusal from None
     if pair.certify(found.settings).feedback.is_exact:
         return replace(found, match="exact")

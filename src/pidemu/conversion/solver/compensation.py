@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
 from pidemu.conversion.match.moments import Asked, MomentProblem, Way, meet
-from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, tried_with, trying
+from pidemu.conversion.match.no_match import REFUSALS, NoMatchError
 from pidemu.conversion.match_method import Match
 from pidemu.conversion.solver.found import Found
 from pidemu.conversion.solver.pair import Pair
 from pidemu.conversion.solver.through_moments import through_moments
 from pidemu.conversion.solver.yardstick import Yardstick
-from pidemu.conversion.target.filter import TargetFilter
 from pidemu.errors import ScanError
 from pidemu.settings.settings import Settings
 
@@ -59,10 +59,10 @@ class Compensation:
         """
         if not self.yardstick.compensates or self._runs_exactly(found.settings):
             return found
-        bent, tried = self._bent(found)
+        bent = self._bent(found)
         runs_exactly = bent is not None and self._runs_exactly(bent.settings)
         if match == "exact" and not runs_exactly:
-            raise NoMatchError("no settings give the same law at these scan intervals and rules", tried=tried)
+            raise NoMatchError("no settings give the same law at these scan intervals and rules")
         if bent is None:
             return found
         how: Match = "exact" if runs_exactly else "low-frequency"
@@ -75,18 +75,14 @@ class Compensation:
             at_scan = (y.at_source_scan, y.scans[1])
         return through_moments(self.pair, solve, start, at_scan, derivative=derivative)
 
-    def _bent(self, found: Found) -> tuple[Found | None, TargetFilter | None]:
-        """Return settings that make up for the scans, ``None`` where there are none that come nearer, and the filter tried last."""
-        tried: TargetFilter | None = found.filter
-        try:
+    def _bent(self, found: Found) -> Found | None:
+        """Return settings that make up for the scans; ``None`` where there are none that come nearer."""
+        with suppress(*REFUSALS, ScanError):
             bent = self.through_moments(self._met, found, derivative=bool(self.pair.wanted.kd))
-            tried = bent.tried
             nearer = self.yardstick.deviation(bent.settings) < self._deviation_if_stable(found.settings) * (1 - CLEARLY)
-            return (bent if nearer and self._keeps_signs(bent.settings) else None), tried
-        except REFUSALS as refusal:
-            return None, tried_with(refusal)
-        except ScanError:
-            return None, tried
+            if nearer and self._keeps_signs(bent.settings):
+                return bent
+        return None
 
     def _keeps_signs(self, settings: Settings) -> bool:
         """Whether every term pushes the way the source's does: making up for scans never turns a derivative round."""
@@ -114,8 +110,7 @@ class Compensation:
         free = self.pair.target.filter.free
         if free:
             problem = _with_a_usable_filter(problem, start)
-        with trying(problem.filter):
-            asked = meet(problem, terms)
+        asked = meet(problem, terms)
         for _ in range(_FILTER_ROUNDS if free else 0):
             law = problem.law(asked)
             kd, Tf = law.algorithm.kd, law.algorithm.Tf

@@ -28,8 +28,6 @@ class Found:
         Why it is not the exact match, where none was asked for; empty where it is.
     compensated : bool
         Whether they make up for the scans: where there is nothing to make up for, they are the plain ones.
-    tried : TargetFilter or None
-        The filter that was tried last on the way; ``None``: the target's own.
     """
 
     settings: Settings
@@ -38,4 +36,3 @@ class Found:
     match: Match
     why: str = ""
     compensated: bool = False
-    tried: TargetFilter | None = None

@@ -11,7 +11,7 @@ from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match import low_frequency as closed
 from pidemu.conversion.match.factors import without_rounding
 from pidemu.conversion.match.moments import meet, sizes
-from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, Refusal, tried_with, trying, with_tried
+from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, Refusal
 from pidemu.conversion.solver.found import Found
 from pidemu.conversion.solver.own_numbers import own_numbers
 from pidemu.conversion.solver.pair import Pair
@@ -41,15 +41,14 @@ def low_frequency(pair: Pair, *, moments: bool = False) -> Found:
     delivered: Found | None = None
     why: Refusal | None = None
     try:
-        delivered = replace(_with_filter(pair, own.fixed), tried=None)
+        delivered = _with_filter(pair, own.fixed)
     except REFUSALS as refusal:
-        why = with_tried(refusal, None)
+        why = refusal
     imitated = own.free and a.kd and a.Tf and filter_status(pair.source) is not Status.ASSUMED
     if imitated and (delivered is None or pair.off(delivered) > _DEAR):
-        like, tried = _with_the_sources_filter(pair, moments=moments)
+        like = _with_the_sources_filter(pair, moments=moments)
         if like is not None:
-            return replace(like, tried=tried)
-        why = why and with_tried(why, tried)
+            return like
     if delivered is None:
         assert why is not None
         raise why
@@ -64,26 +63,19 @@ def keeps_the_moments(pair: Pair, found: Found) -> bool:
     return all(abs(x - y) <= _KEPT * s for x, y, s in zip(wanted, have, size, strict=True))
 
 
-def _with_the_sources_filter(pair: Pair, *, moments: bool) -> tuple[Found | None, TargetFilter | None]:
-    """Return what is nearest with the source's filter time: the same moments or, where these may go, its own numbers.
-
-    Beside it stands the filter that was tried last.
-    """
+def _with_the_sources_filter(pair: Pair, *, moments: bool) -> Found | None:
+    """Return what is nearest with the source's filter time: the same moments or, where these may go, its own numbers."""
     found: list[Found] = []
     if not moments:
         with suppress(*REFUSALS):
             kept = _gain_and_integral_kept(pair)
             if pair.off(kept) <= _DEAR:
-                return kept, None
+                return kept
         with suppress(*REFUSALS):
             found.append(replace(own_numbers(pair, filtered=True), match="low-frequency"))
-    tried: TargetFilter | None = None
-    try:
+    with suppress(*REFUSALS):
         found.append(_with_filter(pair, pair.target.filter.nearest_to(*_wanted_filter(pair))))
-        tried = found[-1].tried
-    except REFUSALS as refusal:
-        tried = tried_with(refusal)
-    return min(found, key=pair.off, default=None), tried
+    return min(found, key=pair.off, default=None)
 
 
 def _gain_and_integral_kept(pair: Pair) -> Found:
@@ -106,9 +98,7 @@ def _gain_and_integral_kept(pair: Pair) -> Found:
 
 
 def _with_filter(pair: Pair, filt: TargetFilter) -> Found:
-    with trying(filt):
-        found = pair.best_of(solutions(pair, pair.scaled.moments(), filt), "low-frequency")
-        return _with_the_moments(pair, replace(found, tried=filt))
+    return _with_the_moments(pair, pair.best_of(solutions(pair, pair.scaled.moments(), filt), "low-frequency"))
 
 
 def _with_the_moments(pair: Pair, found: Found) -> Found:

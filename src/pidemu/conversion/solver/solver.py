@@ -13,7 +13,7 @@ from pidemu.certificate.noise import MORE, noise_gain
 from pidemu.conversion.evidence import filter_status
 from pidemu.conversion.match.moments import Asked, MomentProblem, Way, at_frequency, in_loop
 from pidemu.conversion.match.nearest import USELESS, nearest
-from pidemu.conversion.match.no_match import REFUSALS, NoMatchError, tried_with
+from pidemu.conversion.match.no_match import REFUSALS, NoMatchError
 from pidemu.conversion.match.terms import check_terms
 from pidemu.conversion.match_method import Aim, Match
 from pidemu.conversion.modes import Modes, law_in
@@ -23,7 +23,6 @@ from pidemu.conversion.solver.found import Found
 from pidemu.conversion.solver.own_numbers import own_numbers
 from pidemu.conversion.solver.pair import Pair, make_pair
 from pidemu.conversion.solver.yardstick import Yardstick, first_of
-from pidemu.conversion.target.filter import TargetFilter
 from pidemu.conversion.target.target import Target
 from pidemu.errors import SettingError
 from pidemu.settings.settings import Settings
@@ -81,7 +80,9 @@ class Solver:
         """Return the nearest settings, where any come near, and the reason why the target refuses."""
         reason = f"{self.pair.target.card.id} cannot do what {self.pair.source.card.id} does: {why}"
         with suppress(SettingError):
-            return self._nearest(tried_with(why)), reason
+            found = self._nearest()
+            if self._comes_near(found):
+                return found, reason
         return None, f"{reason}; no settings of it come near"
 
     @property
@@ -117,8 +118,8 @@ class Solver:
         alike = noise_gain(own.settings) <= MORE * (1 + CLEARLY) * noise_gain(source) * abs(self.pair.factor)
         return own if near and alike else None
 
-    def _nearest(self, filt: TargetFilter | None = None) -> Found:
-        """Return the nearest settings, sought with a filter, by default the target's own.
+    def _nearest(self) -> Found:
+        """Return the nearest settings, with the filter that the target delivers.
 
         Raises
         ------
@@ -128,8 +129,7 @@ class Solver:
         target = self.pair.target
         # nothing imitates a missing proportional term
         idle = not self.pair.wanted.kp and target.has_proportional
-        process, filt = self.yardstick.process, filt or target.filter
-        numbers = None if idle else nearest(self.pair.matched, target, filt, self.pair.factor, process)
+        numbers = None if idle else nearest(self.pair.matched, target, self.pair.factor, self.yardstick.process)
         if numbers is None:
             raise SettingError("no settings come near")
         return self.pair.settle(numbers, "constrained")
@@ -153,13 +153,17 @@ class Solver:
         nearer = choices[-1][0] < choices[0][0] * (1 - CLEARLY)
         if off >= USELESS or (off > _FAR and not unfiltered) or nearer:
             with suppress(SettingError):
-                near = self._nearest(found.tried)
+                near = self._nearest()
                 choices.append((judge.distance(near.settings), near))
         _, best = min(choices, key=lambda c: c[0] if c[1].match == "low-frequency" else c[0] * (1 + CLEARLY))
-        notched = not a.kp  # integral and derivative alone cancel at one frequency: no measure there
-        if not notched and judge.continuous_deviation(best.settings) >= USELESS:
-            raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all", tried=found.tried)
+        if not self._comes_near(best):
+            raise NoMatchError("what comes nearest is as far off in the loop band as no controller at all")
         return replace(best, why=found.why)
+
+    def _comes_near(self, found: Found) -> bool:
+        """Tell whether settings are nearer than no controller at all."""
+        notched = not self.pair.wanted.kp  # integral and derivative alone cancel at one frequency: no measure there
+        return notched or self.yardstick.continuous_deviation(found.settings) < USELESS
 
     def _by_moments(self, solve: Way, match: Match) -> Found:
         """Return settings found by way of their moments, from those of the closed forms."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pidemu.card.model.base import Form
 from pidemu.conversion.match.low_frequency import low_frequency
 from pidemu.conversion.match.moments import MomentProblem, Way
-from pidemu.conversion.match.no_match import NoMatchError, trying
+from pidemu.conversion.match.no_match import NoMatchError
 from pidemu.conversion.solver.found import Found
 from pidemu.conversion.solver.pair import Pair
 from pidemu.conversion.target.filter import TargetFilter
@@ -36,7 +36,7 @@ def through_moments(
 
     Raises
     ------
-    NoMatchError
+    NoMatchError, SettingError
         There are none, or they leave the target's ranges.
     """
     target = pair.target
@@ -50,12 +50,9 @@ def through_moments(
         return found
 
     law, scan = at_scan or (pair.law, None)
-    with trying(start.filter):
-        problem = MomentProblem(pair.as_matched(law, pair.factor), target, start.filter, closed_form, scan)
-        problem, moments = solve(problem, pair.scaled.moments())
-    with trying(problem.filter):
-        found = pair.settle(problem.numbers(moments), start.match, problem.wanted, problem.scan)
-    return replace(found, tried=problem.filter)
+    problem = MomentProblem(pair.as_matched(law, pair.factor), target, start.filter, closed_form, scan)
+    problem, moments = solve(problem, pair.scaled.moments())
+    return pair.settle(problem.numbers(moments), start.match, problem.wanted, problem.scan)
 
 
 def solutions(pair: Pair, moments: Sequence[float], filt: TargetFilter) -> Iterator[Numbers]:
