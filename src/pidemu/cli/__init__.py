@@ -11,7 +11,7 @@ import click
 
 from pidemu.cli import interrupts, streams
 from pidemu.conversion.refused import ConversionRefusedError
-from pidemu.errors import CardError, CardNotFoundError, PidemuError, suggest
+from pidemu.errors import CardError, CardNotFoundError, FitRefusedError, PidemuError, suggest
 from pidemu.excerpt import printable
 
 _COMMANDS: Final = {
@@ -22,6 +22,7 @@ _COMMANDS: Final = {
     "run": "Run a card on recorded signals.",
     "compare": "Run cards on the same signals and compare their outputs.",
     "simulate": "Run a card in a closed loop with a process.",
+    "fit": "Fit a process to the record of a bump test.",
     "fleet": "Run a file of closed loops, on all cores or on a cluster.",
     "matrix": "Convert typical settings of every card to every card.",
     "verify": "Compute a signed certificate again, and say what changed.",
@@ -117,5 +118,5 @@ def _report(error: Exception) -> int:
     if not isinstance(error, PidemuError):
         raise error
     click.echo(printable(f"error: {error}"), err=True)
-    failed = isinstance(error, ConversionRefusedError | CardError) and not isinstance(error, CardNotFoundError)
+    failed = isinstance(error, ConversionRefusedError | FitRefusedError | CardError) and not isinstance(error, CardNotFoundError)
     return 1 if failed else 2
