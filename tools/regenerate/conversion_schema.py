@@ -95,7 +95,9 @@ def schema() -> dict[str, Any]:
     definitions["ConversionPart"]["properties"]["certificate"] = reference
     definitions["TextbookPart"]["properties"]["certificate"] = {"anyOf": [reference, {"type": "null"}]}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": SCHEMA}
-    found: dict[str, Any] = without_titles({**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions}, SCHEMA)
+    found: dict[str, Any] = without_titles(
+        {**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions}, SCHEMA
+    )
     return found
 
 

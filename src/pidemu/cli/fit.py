@@ -12,7 +12,8 @@ from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.errors import FitRefusedError, RecordError
 from pidemu.excerpt import visible
 from pidemu.files.tables import counted
-from pidemu.process.fit.document import plain_process, plain_refusal
+from pidemu.process.document import plain_process
+from pidemu.process.fit.document import plain_refusal
 from pidemu.process.fit.fit import METHODS, MODELS, Method, Model, ProcessFit, fit_process
 from pidemu.process.process import Process
 from pidemu.process.text import written
@@ -35,7 +36,7 @@ from pidemu.settings.ranges import PERCENT, SignalRange
     type=click.Choice(METHODS),
     default="least-squares",
     show_default=True,
-    help="Least squares of all samples, or the curve of one step read by its tangent (Fit 1), or by tangent and 63.2 % point (Fit 2).",
+    help="Least squares of all samples; or the curve of one step, read by its tangent (Fit 1) or tangent and 63.2 % point (Fit 2).",
 )
 @click.option("--from", "begin", type=Time(), help="Leave out what is before this time.")
 @click.option("--to", "end", type=Time(), help="Leave out what is after this time.")
@@ -45,7 +46,9 @@ from pidemu.settings.ranges import PERCENT, SignalRange
     default=None,
     help="Fit an even drift of the measurement as well; by default where it plainly drifts before the output first moves.",
 )
-@click.option("--pv-range", type=Range(), help="Range of the measurement, if it was recorded in its own units: the gain is given in %/%, too.")
+@click.option(
+    "--pv-range", type=Range(), help="Range of the measurement, if it was recorded in its own units: the gain is given in %/%, too."
+)
 @click.option("--op-range", type=Range(), help="Range of the output, if it is not 0 to 100 %.")
 @click.option(
     "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw record, model and residuals; needs matplotlib."
@@ -66,8 +69,8 @@ def command(
 ) -> None:
     """Fit a process to FILE.csv, the record of a test in which the output moved and the measurement answered.
 
-    The columns are those of other records: time, output (or op), pv; and sp and auto, where the loop was closed. A record of a closed
-    loop is refused, unless a setpoint step moved it.
+    The columns are those of other records: time, output (or op), pv; and sp and auto, where the loop was closed. A record of a
+    closed loop is refused, unless a setpoint step moved it.
     """
     if picture is not None:
         from pidemu.report.plots import check_picture
@@ -106,7 +109,9 @@ def _fit(record: Record, file: str, scan: float | None, window: tuple[float | No
     begin, end = window
     inside = (times >= (-np.inf if begin is None else begin)) & (times <= (np.inf if end is None else end))
     if not inside.any():
-        raise RecordError(f"{visible(file)}: no sample between --from and --to; the record is from {times[0]:g} s to {times[-1]:g} s")
+        raise RecordError(
+            f"{visible(file)}: no sample between --from and --to; the record is from {times[0]:g} s to {times[-1]:g} s"
+        )
     columns: dict[str, Any] = {}
     if "sp" in record.names:
         columns["setpoint"] = record.sp[inside]
@@ -118,7 +123,7 @@ def _fit(record: Record, file: str, scan: float | None, window: tuple[float | No
 def _print(found: ProcessFit, percent: Process | None) -> None:
     process, fit = found.process, found.fit
     heading(f"{process}  ({fit.model}, {fit.method})")
-    lags = sorted((-1 / p.real for p in process.poles if p), reverse=True)
+    lags = _lags(process)
     per = f"{process.unit}/s" if process.integrators else process.unit
     own = "" if process.unit == "%/%" else process.unit.rsplit("/", 1)[0]
     pv = own or "%"
@@ -140,7 +145,11 @@ def _print(found: ProcessFit, percent: Process | None) -> None:
     table(["", ""], rows)
     if percent is not None:
         echo(f"\nin percent of the ranges: {percent}")
-    echo(f"\n--process '{written(percent or process)}'")
+    echo(f"\n--process '{written((percent or process).rounded())}'")
+
+
+def _lags(process: Process) -> list[float]:
+    return sorted((-1 / p.real for p in process.poles if p), reverse=True)
 
 
 def _between(interval: tuple[float, float] | None, factor: float = 1.0) -> str:

@@ -52,7 +52,7 @@ _FAMILIES: Final[dict[str, _Family]] = {
 }
 
 
-def test_batch(family: str | None = None) -> dict[str, Process]:
+def test_batch(family: str | None = None) -> dict[str, Process]:  # noqa: PT028
     """Return the test batch of Astrom and Hagglund by name, such as ``"P4 n=3"``.
 
     Parameters
@@ -80,7 +80,9 @@ def test_batch(family: str | None = None) -> dict[str, Process]:
     """
     names = list(dict.fromkeys(name.partition(" ")[0] for name in _FAMILIES))
     if family is not None and family not in names:
-        raise ProcessError(f"no family '{quoted(family)}' in the test batch{suggest(str(family), names)}; families: {', '.join(names)}")
+        raise ProcessError(
+            f"no family '{quoted(family)}' in the test batch{suggest(str(family), names)}; families: {', '.join(names)}"
+        )
     return dict(_processes(family))
 
 

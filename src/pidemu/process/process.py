@@ -142,10 +142,21 @@ class Process:
         for what, unit, given in zip(("measurement", "output"), self.unit.rsplit("/", 1), ranges, strict=True):
             if given.unit not in ("", unit):
                 raise ProcessError(
-                    f"the gain of {self} is in {self.unit}, and the range of the {what}, {given}, in another unit; give it in {unit}"
+                    f"the gain of {self} is in {self.unit}, and the range of the {what}, {given}, in another; give it in {unit}"
                 )
         pv, op = (given.span for given in ranges)
         return replace(self, gain=self.gain * op / pv, unit=PERCENT)
+
+    def rounded(self, digits: int = 6) -> Process:
+        """Return the process with so many significant digits of gain, lags and leads, and dead time, as they are printed."""
+
+        def short(x: complex) -> complex:
+            if x.imag:
+                return complex(short(x.real).real, short(x.imag).real)
+            return complex(float(f"{x.real:.{digits}g}"))
+
+        poles, zeros = ([r and (short(r) if r.imag else 1 / short(1 / r)) for r in roots] for roots in (self.poles, self.zeros))
+        return Process(short(self.gain + 0j).real, poles, zeros, short(self.delay + 0j).real, self.unit)
 
     def check_percent(self) -> None:
         """Refuse a process whose gain is not in %/%, for a loop that is computed in percent.
@@ -156,7 +167,9 @@ class Process:
             It is not.
         """
         if self.unit != PERCENT:
-            raise ProcessError(f"the gain of {self} is in {self.unit}, and a loop is computed in %/%; give process.in_percent(pv_range)")
+            raise ProcessError(
+                f"the gain of {self} is in {self.unit}, and a loop is computed in %/%; give process.in_percent(pv_range)"
+            )
 
     def response(self, w: npt.ArrayLike) -> Response:
         """Return the frequency response, the dead time exact.

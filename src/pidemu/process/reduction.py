@@ -61,7 +61,9 @@ def half_rule(process: Process, order: Literal[1, 2] = 1) -> Process:
             f"the leads of {process} are longer than the dead time and the small lags together, so that the half rule would leave "
             f"a dead time of {delay:g} s; {_EXAMPLE}"
         )
-    return Process.from_lags(process.gain, kept, integrators=process.integrators, delay=delay if delay > rounding else 0.0, unit=process.unit)
+    return Process.from_lags(
+        process.gain, kept, integrators=process.integrators, delay=delay if delay > rounding else 0.0, unit=process.unit
+    )
 
 
 def _lag(pole: complex) -> float:

@@ -21,7 +21,7 @@ _NAMES: Final = ("gain", "lag", "lead", "integrators", "delay", "pole", "zero")
 
 
 def read(text: str) -> tuple[float, list[complex], list[complex], float, str]:
-    """Return gain, poles, zeros, dead time and unit of the gain of a process in words; see `pidemu.process.process.parse_process`."""
+    """Return gain, poles, zeros, dead time and unit of a process in words; see `pidemu.process.process.parse_process`."""
     given: dict[str, list[str]] = {name: [] for name in _NAMES}
     for item in text.split(","):
         name, equals, value = (part.strip() for part in item.partition("="))
@@ -58,9 +58,7 @@ def gain_unit(given: Any) -> str:
     if parts in (["1"], [""]):
         return PERCENT
     if len(parts) != 2 or not all(parts) or any(c in given for c in ",=\n"):
-        raise ProcessError(
-            f"the unit of a process gain is {shown(given)}; give that of the measurement per that of the output, such as %/% or degC/%"
-        )
+        raise ProcessError(f"the unit of a process gain is {shown(given)}; give measurement per output, such as %/% or degC/%")
     return "/".join(parts)
 
 

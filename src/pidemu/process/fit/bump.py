@@ -96,7 +96,7 @@ def read_bump(time: Any, output: Any, measurement: Any, setpoint: Any = None) ->
     columns = {name: values[good] for name, values in (columns | {"output": held}).items()}
     if columns["time"].size < _FEWEST:
         raise RecordError(
-            f"{counted(columns['time'].size, 'sample')} with a measurement; a fit needs {_FEWEST} at least, and some dozens to be any good"
+            f"{counted(columns['time'].size, 'sample')} with a measurement; a fit needs {_FEWEST} at least, better dozens"
         )
     _check_times(given_time)
     return BumpTest(
@@ -157,13 +157,13 @@ def _first_move(output: Floats) -> int:
     moves = np.flatnonzero(np.diff(output)) + 1
     if not moves.size:
         raise FitRefusedError(
-            f"the output stays at {output[0]:g}: without a bump there is nothing to fit; move the output in manual by some percent, "
+            f"the output stays at {output[0]:g}: without a bump there is nothing to fit; move the output in manual by some percent "
             f"and record until the measurement has settled"
         )
     if moves[0] >= output.size - 3:
         raise FitRefusedError(
-            f"the output first moves at sample {moves[0] + 1} of {output.size}, at the end of the record; go on recording until the "
-            f"measurement has settled"
+            f"the output first moves at sample {moves[0] + 1} of {output.size}, at the end of the record; go on recording until "
+            f"the measurement has settled"
         )
     return int(moves[0])
 

@@ -1,43 +1,23 @@
-"""The form of a fit in ``pidemu fit --json``, as models; ``python -m tools.regenerate`` makes ``specs/fit.schema.json`` from them."""
+"""The form of a fit in ``pidemu fit --json``; ``python -m tools.regenerate`` makes ``specs/fit.schema.json``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pidemu.formatting import json_safe
+from pidemu.process.document import DocumentPart, Number, ProcessPart, plain_process
 from pidemu.process.fit.goodness import CONFIDENCE
-from pidemu.process.text import written
 
 if TYPE_CHECKING:
     from pidemu.process.fit.fit import ProcessFit
-    from pidemu.process.process import Process
 
 SCHEMA: Final = "pidemu-fit-1"
-Number = float | Literal["inf", "-inf", "nan"]
-"""JSON has no infinity: it is written as a word."""
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
-class FitPart(BaseModel):
-    """A part of the document; what it does not name is not in it."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
-
-
-class ProcessPart(FitPart):
-    """A process."""
-
-    gain: float = Field(description="Gain [unit], per second too for an integrator.")
-    unit: str = Field(description="Unit of the gain: of the measurement per unit of the output.")
-    lags: list[float] = Field(description="Time constants [s], the largest first.")
-    integrators: int
-    delay: float = Field(description="Dead time [s].")
-    text: str = Field(description="The process as `--process` takes it.")
-
-
-class FiguresPart(FitPart):
+class FiguresPart(DocumentPart):
     """How the process was found, and how good the fit is."""
 
     model: Literal["fopdt", "sopdt", "ipdt"]
@@ -48,14 +28,16 @@ class FiguresPart(FitPart):
     r_squared: float = Field(description="Share of the measurement's variance that the model explains.")
     correlation: float = Field(description="Correlation of neighbouring residuals; noise has none.")
     confidence: float = Field(description="Probability that an interval holds the true number, if the model is true.")
-    intervals: dict[str, Pair] = Field(description="By number: gain, start, drift, lag (lag 1, lag 2), delay; none of a curve that was read.")
+    intervals: dict[str, Pair] = Field(
+        description="Of gain, start, drift, lag (lag 1, lag 2) and delay; none of a curve that was read."
+    )
     samples: int
     moves: int = Field(description="How often the output moves.")
     closed_loop: bool = Field(description="Whether the loop was closed, and moved by its setpoint.")
     notes: list[str]
 
 
-class FitDocument(FitPart):
+class FitDocument(DocumentPart):
     """A fit."""
 
     schema_: Literal["pidemu-fit-1"] = Field(alias="schema", description="Name and version of this form.")
@@ -64,24 +46,12 @@ class FitDocument(FitPart):
     fit: FiguresPart
 
 
-class FitRefusal(FitPart):
+class FitRefusal(DocumentPart):
     """Why nothing can be fitted."""
 
     schema_: Literal["pidemu-fit-1"] = Field(alias="schema")
     verdict: Literal["refused"]
     reason: str
-
-
-def plain_process(process: Process) -> dict[str, Any]:
-    """Return a process with real lags as plain values."""
-    return {
-        "gain": process.gain,
-        "unit": process.unit,
-        "lags": sorted((-1 / p.real for p in process.poles if p), reverse=True),
-        "integrators": process.integrators,
-        "delay": process.delay,
-        "text": written(process),
-    }
 
 
 def plain(found: ProcessFit) -> dict[str, Any]:

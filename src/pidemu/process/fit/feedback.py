@@ -1,8 +1,8 @@
 """Whether the loop was closed while a record was made: whether the measurement tells where the output moves next.
 
 An operator's bumps come whatever the measurement does. A controller's moves follow from it: what the past of the output leaves open
-of each move, the measurement of that moment explains. A fit of such a record tends to the controller turned round, ``-1/C``, and not
-to the process, unless something that is neither, such as a setpoint step, moves the loop.
+of each move, the measurement of that moment explains. A fit of such a record tends to the controller turned round, ``-1/C``, and
+not to the process, unless something that is neither, such as a setpoint step, moves the loop.
 """
 
 from __future__ import annotations

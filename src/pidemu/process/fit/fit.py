@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -86,11 +86,11 @@ class FitFigures:
     moves: int
     closed_loop: bool
     notes: tuple[str, ...]
-    time: Floats
-    output: Floats
-    measurement: Floats
-    simulated: Floats
-    residuals: Floats
+    time: Floats = field(repr=False)
+    output: Floats = field(repr=False)
+    measurement: Floats = field(repr=False)
+    simulated: Floats = field(repr=False)
+    residuals: Floats = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -181,12 +181,17 @@ def fit_process(
     _check_answer(test, found, goodness, closed)
     sure = {} if reader else intervals(test, found, goodness)
     process = Process.from_lags(found.gain, found.lags, integrators=not found.lags, delay=found.delay, unit=unit)
-    notes = (*test.notes, *_notes(test, found, goodness, model, fitted=reader is None, automatic=reader is None and drift is None and drifts, closed=bool(closed)))
+    notes = [*test.notes, *_notes(test, found)]
+    if reader is None:
+        notes += _doubts(test, found, goodness, model, automatic=drift is None and drifts)
+    if closed:
+        notes.append("the loop was closed; the setpoint moved it enough for a fit, and a bump in manual is still the better test")
     return ProcessFit(
         process,
         FitFigures(
             model, method, found.start, found.drift, goodness.rms, goodness.r_squared, goodness.correlation, sure, test.time.size,
-            len(test.moves), bool(closed), notes, test.time, test.output, test.measurement, goodness.simulated, goodness.residuals,
+            len(test.moves), bool(closed), tuple(notes), test.time, test.output, test.measurement, goodness.simulated,
+            goodness.residuals,
         ),
     )  # fmt: skip
 
@@ -206,7 +211,9 @@ def _is_closed(test: BumpTest, auto: npt.ArrayLike | None) -> str:
     if auto is not None:
         modes = np.asarray(auto, dtype=float)
         if modes.shape != np.shape(test.given_time):
-            raise RecordError(f"auto has {modes.size:,} samples, and time {len(test.given_time):,}; give one value of each per sample")
+            raise RecordError(
+                f"auto has {modes.size:,} samples, and time {len(test.given_time):,}; give one value of each per sample"
+            )
         if not modes.any():
             return ""
         if modes.all():
@@ -227,7 +234,8 @@ def _is_closed(test: BumpTest, auto: npt.ArrayLike | None) -> str:
 
 def _setpoint_move(test: BumpTest) -> float:
     """Return how far the setpoint moves."""
-    return 0.0 if test.setpoint is None else float(np.ptp(test.setpoint[np.isfinite(test.setpoint)], initial=0.0))
+    known = np.empty(0) if test.setpoint is None else test.setpoint[np.isfinite(test.setpoint)]
+    return float(np.ptp(known)) if known.size else 0.0
 
 
 def _drifts(test: BumpTest) -> bool:
@@ -247,21 +255,15 @@ def _check_answer(test: BumpTest, found: Optimum, goodness: Goodness, closed: st
     """Refuse a fit in which the measurement does not answer the output, or does so in a closed loop that nothing else moved."""
     if not np.ptp(test.measurement) or not found.gain or goodness.evidence < _EVIDENCE:
         raise FitRefusedError(
-            f"the measurement does not answer the output's move: beside its noise, {goodness.rms:.2g}, no response can be told; make "
-            f"a larger bump, record for longer, or look whether the output reaches the process"
+            f"the measurement does not answer the output's move: beside its noise, {goodness.rms:.2g}, no response can be told; "
+            f"make a larger bump, record for longer, or look whether the output reaches the process"
         )
     if closed and (_setpoint_move(test) < _EXCITED * goodness.rms or goodness.r_squared < _EXPLAINED):
         raise FitRefusedError(f"{closed} (the setpoint moves by {_setpoint_move(test):.3g}, the fit leaves {goodness.rms:.2g})")
 
 
-def _notes(
-    test: BumpTest, found: Optimum, goodness: Goodness, model: Model, *, fitted: bool, automatic: bool, closed: bool
-) -> Iterator[str]:
-    """Yield what should be known beside the numbers."""
-    if automatic:
-        yield f"the measurement drifts before the output moves: a drift of {60 * found.drift:.3g} per minute was fitted as well"
-    if closed:
-        yield "the loop was closed; the setpoint moved it enough for a fit, and a bump in manual is still the better test"
+def _notes(test: BumpTest, found: Optimum) -> Iterator[str]:
+    """Yield what should be known beside the numbers, whatever the method."""
     if found.lags and test.duration - found.delay < 2 * found.lags[0]:
         yield (
             f"the record ends {test.duration:.3g} s after the output first moved, before the measurement has settled: gain and lag "
@@ -269,9 +271,15 @@ def _notes(
         )
     if found.delay < test.spacing:
         yield f"the dead time is shorter than the time between two samples, {test.spacing:.3g} s"
+
+
+def _doubts(test: BumpTest, found: Optimum, goodness: Goodness, model: Model, *, automatic: bool) -> Iterator[str]:
+    """Yield what the residuals of least squares say against the model."""
+    if automatic:
+        yield f"the measurement drifts before the output moves: a drift of {60 * found.drift:.3g} per minute was fitted as well"
     if len(found.lags) == 2 and found.lags[1] < test.spacing:
         yield "the second lag is shorter than the time between two samples: fopdt says as much"
-    if fitted and goodness.correlation > _ALIKE and goodness.rms > 1e-6 * float(np.ptp(test.measurement)):
+    if goodness.correlation > _ALIKE and goodness.rms > 1e-6 * float(np.ptp(test.measurement)):
         more = {"fopdt": "; try the model sopdt", "ipdt": "; try the model fopdt"}.get(model, "")
         yield (
             f"neighbouring residuals are alike (correlation {goodness.correlation:.2f}): the process has more dynamics than this "

@@ -1,7 +1,8 @@
 """Least squares of all samples: gain, start and drift by linear algebra, time constants and dead time by search.
 
-Where a dead time ends on a sample, the sum of squares has a kink for every move of the output, and with noise a local minimum at many
-of them: a gradient method stops in one. So the dead time is cut at these kinks, and the best of the smooth pieces around counts.
+Where a dead time ends on a sample, the sum of squares has a kink for every move of the output, and with noise a local minimum at
+many of them: a gradient method stops in one. So the dead time is cut at these kinks, and the best of the smooth pieces around it
+counts.
 """
 
 from __future__ import annotations
@@ -113,7 +114,8 @@ class Search:
         """Return the local minimum near a start, the dead time between two bounds, and its sum of squares."""
         below = np.array([*[math.log(self._shortest)] * self.order, low])
         above = np.array([*[math.log(self._longest)] * self.order, high])
-        scale = np.array([*[1.0] * self.order, max(min(high - low, float(np.exp(start[:-1]).sum()) + start[-1]), self._test.spacing)])
+        usual = float(np.exp(start[:-1]).sum() + start[-1])
+        scale = np.array([*[1.0] * self.order, max(min(high - low, usual), self._test.spacing)])
         return least_squares(self._residuals, start, below, above, scale)
 
     def _pieces(self, delay: float) -> Iterator[tuple[float, float]]:
@@ -153,7 +155,12 @@ def _thinned(test: BumpTest) -> BumpTest:
     kept += [move + after for move in moves[:_FEW_MOVES]]
     at = np.unique(np.clip(np.concatenate(kept).astype(int), 0, n - 1))
     return replace(
-        test, time=test.time[at], output=test.output[at], measurement=test.measurement[at], setpoint=None, first=int(np.searchsorted(at, test.first))
+        test,
+        time=test.time[at],
+        output=test.output[at],
+        measurement=test.measurement[at],
+        setpoint=None,
+        first=int(np.searchsorted(at, test.first)),
     )
 
 

@@ -1,7 +1,7 @@
 """Reading a reaction curve as by hand: the tangent at its steepest point, and the time to 63.2 % of its change.
 
-Miller, Lopez, Smith and Murrill, *A Comparison of Controller Tuning Techniques* (1967): ``Fit 1`` has the lag ``K/Rr`` of the tangent
-with the slope ``Rr``, ``Fit 2`` the lag that brings 63.2 % of the change at its time; both have the tangent's dead time.
+Miller, Lopez, Smith and Murrill, *A Comparison of Controller Tuning Techniques* (1967): ``Fit 1`` has the lag ``K/Rr`` of the
+tangent with the slope ``Rr``, ``Fit 2`` the lag that brings 63.2 % of the change at its time; both have the tangent's dead time.
 """
 
 from __future__ import annotations
@@ -125,14 +125,14 @@ def _end(test: BumpTest, noise: float) -> float:
     change = abs(float(last.mean()) - float(y[: test.first + 1].mean()))
     if moved > _SETTLED * change + 4 * noise / math.sqrt(before.size):
         raise FitRefusedError(
-            f"the measurement has not settled: it still moves by {moved:.3g} over the last tenth of the curve; record for longer, or "
-            f"use model='ipdt' where it never settles; {_ELSE}"
+            f"the measurement has not settled: it still moves by {moved:.3g} over the last tenth of the curve; record for longer, "
+            f"or use model='ipdt' where it never settles; {_ELSE}"
         )
     return float(last.mean())
 
 
 def _steepest(test: BumpTest, noise: float, sign: float) -> tuple[_Line, int]:
-    """Return the tangent at the steepest point, from the window that shows the steepest slope for sure, and its width in samples."""
+    """Return the tangent at the steepest point, from the window whose slope is steepest for sure, and its width in samples."""
     t, y = test.time[test.first :], test.measurement[test.first :]
     best, surest, width, chosen = None, 0.0, 2, 2
     while width <= max(2, t.size // 3):
@@ -163,7 +163,7 @@ def _line(t: Floats, y: Floats) -> _Line:
 
 
 def _crossing(test: BumpTest, value: float, width: int) -> float:
-    """Return when the curve crosses a value: where as few samples as can be lie on the wrong side, by a line through those around."""
+    """Return when the curve crosses a value: where fewest samples lie on the wrong side, by a line through those around."""
     t, y = test.time[test.first :], test.measurement[test.first :]
     rises = float(y[-1]) > float(y[0])
     beyond = (y >= value) == rises

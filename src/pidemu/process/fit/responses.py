@@ -1,4 +1,4 @@
-"""Exact responses to an output that holds between its moves, at any times: a lag, two lags in a row, an integrator; gain 1, no dead time.
+"""Exact responses to an output that holds between its moves: a lag, two lags in a row, an integrator, at any times.
 
 Between two moves the state of a lag is an exponential. So its states at the moves are found first, and from them the response at
 any time; a dead time moves the times alone.
