@@ -11,7 +11,7 @@ import click
 
 from pidemu.cli import interrupts, streams
 from pidemu.conversion.refused import ConversionRefusedError
-from pidemu.errors import CardError, CardNotFoundError, FitRefusedError, PidemuError, suggest
+from pidemu.errors import CardError, CardNotFoundError, PidemuError, suggest
 from pidemu.excerpt import printable
 
 _COMMANDS: Final = {
@@ -119,5 +119,5 @@ def _report(error: Exception) -> int:
     if not isinstance(error, PidemuError):
         raise error
     click.echo(printable(f"error: {error}"), err=True)
-    failed = isinstance(error, ConversionRefusedError | FitRefusedError | CardError) and not isinstance(error, CardNotFoundError)
+    failed = isinstance(error, ConversionRefusedError | CardError) and not isinstance(error, CardNotFoundError)
     return 1 if failed else 2

@@ -85,7 +85,8 @@ def command(
     except FitRefusedError as error:
         if as_json:
             print_json(plain_refusal(str(error)))
-        raise FitRefusedError(f"{visible(file)}: {error}") from None
+        echo(f"error: {visible(file)}: {error}", err=True)
+        raise SystemExit(1) from None
     percent = None if ranges is None else found.process.in_percent(*ranges)
     if as_json:
         more = {} if percent is None else {"percent": plain_process(percent)}

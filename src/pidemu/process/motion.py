@@ -72,7 +72,7 @@ class Motion:
         for _ in range(_HALVINGS):
             if not last or not first or high - low <= 4 * np.spacing(high):
                 break
-            middle = high - last * (high - low) / (last - first)  # a secant, kept from one-sided creeping (Illinois)
+            middle = high - last * (high - low) / (last - first) if last != first else low  # a secant, after Illinois
             if not low < middle < high:
                 middle = (low + high) / 2
             value = beyond(middle)

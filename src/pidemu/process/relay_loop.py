@@ -17,7 +17,7 @@ from pidemu.process.motion import Motion
 from pidemu.process.process import Process
 
 Floats = npt.NDArray[np.float64]
-_PERIODS: Final = 400
+_PERIODS: Final = 200
 """Periods after which an oscillation that has not become even is none."""
 _EVEN: Final = 1e-9
 """Relative difference of two periods that are alike."""
@@ -85,7 +85,7 @@ class RelayLoop:
         self._arriving = deque([(process.delay, relay.high)] if process.delay else [])
         self._signals: list[tuple[Floats, Floats, float]] = []
         turns = [abs(p.imag) for p in process.poles if p.imag]
-        self._chunk = min((1 / max(turns) if turns else math.inf), self._scale)
+        self._chunk, self._longest = self._scale, 1 / max(turns) if turns else math.inf
         if not process.delay:  # away from rest, where a relay without hysteresis would not know what to do
             self._motion.move(_KICK * self._scale, self._input)
 
@@ -126,7 +126,7 @@ class RelayLoop:
         patience = _WAIT * (self._scale + self._process.delay) * (1 + len(self._process.poles))
         while True:
             until = self._arriving[0][0] - self._now if self._arriving else math.inf
-            length = min(until, self._chunk)
+            length = min(until, max(self._chunk, self._now - begun), self._longest)
             at, switches = self._look(length)
             found.append(self._extremes(at))
             self._motion.move(at, self._input)

@@ -131,7 +131,8 @@ def _root(r: complex, time: str, root: str) -> str:
     """Return a root as a time constant where that is the same number, else in the s plane; a complex one brings its conjugate."""
     if r.imag:
         return f"{root}={r.real!r}{r.imag:+}j"
-    constant = exactly(-1 / r.real) if r.real else ""
-    if constant and -1 / float(constant) == r.real and (root == "zero" or r.real < 0):
-        return f"{time}={constant}"
+    if r.real and (root == "zero" or r.real < 0):
+        for constant in (f"{-1 / r.real:.12g}", repr(-1 / r.real)):
+            if -1 / float(constant) == r.real:
+                return f"{time}={constant}"
     return f"{root}={r.real!r}"

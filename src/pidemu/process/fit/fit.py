@@ -31,7 +31,7 @@ _READERS: Final[dict[tuple[str, str], Callable[[BumpTest], Optimum]]] = {
     ("fopdt", "two-point"): lambda test: read_curve(test, by_point=True),
     ("ipdt", "tangent"): read_slopes,
 }
-_EVIDENCE: Final = 12.0
+_EVIDENCE: Final = 25.0
 """Below this F ratio an answer of the measurement may be chance."""
 _EXCITED: Final = 10.0
 """Setpoint steps that allow a fit in a closed loop are so many times the residuals."""
@@ -39,8 +39,8 @@ _EXPLAINED: Final = 0.9
 """Share of the variance that such a fit must explain."""
 _STEEP: Final = 6.0
 """Slopes before the first move count as a drift from so many standard errors on."""
-_ALIKE: Final = 0.5
-"""Correlation of neighbouring residuals that a note is made of."""
+_ALIKE: Final = 0.2
+"""Correlation of neighbouring residuals that a note is made of, in a record of many samples."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def fit_process(
     reader = _READERS.get((model, method))
     found = Search(test, _LAGS[model], drifts).optimum() if reader is None else reader(test)
     goodness = judge(test, found)
-    _check_answer(test, found, goodness, closed)
+    _check_answer(test, found, goodness, closed, fitted=reader is None)
     sure = {} if reader else intervals(test, found, goodness)
     process = Process.from_lags(found.gain, found.lags, integrators=not found.lags, delay=found.delay, unit=unit)
     notes = [*test.notes, *_notes(test, found)]
@@ -251,9 +251,9 @@ def _drifts(test: BumpTest) -> bool:
     return bool(abs(slope) > _STEEP * error + rounding)
 
 
-def _check_answer(test: BumpTest, found: Optimum, goodness: Goodness, closed: str) -> None:
+def _check_answer(test: BumpTest, found: Optimum, goodness: Goodness, closed: str, *, fitted: bool) -> None:
     """Refuse a fit in which the measurement does not answer the output, or does so in a closed loop that nothing else moved."""
-    if not np.ptp(test.measurement) or not found.gain or goodness.evidence < _EVIDENCE:
+    if not np.ptp(test.measurement) or not found.gain or (fitted and goodness.evidence < _EVIDENCE):
         raise FitRefusedError(
             f"the measurement does not answer the output's move: beside its noise, {goodness.rms:.2g}, no response can be told; "
             f"make a larger bump, record for longer, or look whether the output reaches the process"
@@ -279,7 +279,7 @@ def _doubts(test: BumpTest, found: Optimum, goodness: Goodness, model: Model, *,
         yield f"the measurement drifts before the output moves: a drift of {60 * found.drift:.3g} per minute was fitted as well"
     if len(found.lags) == 2 and found.lags[1] < test.spacing:
         yield "the second lag is shorter than the time between two samples: fopdt says as much"
-    if goodness.correlation > _ALIKE and goodness.rms > 1e-6 * float(np.ptp(test.measurement)):
+    if goodness.correlation > max(_ALIKE, 4 / test.time.size**0.5) and goodness.rms > 1e-6 * float(np.ptp(test.measurement)):
         more = {"fopdt": "; try the model sopdt", "ipdt": "; try the model fopdt"}.get(model, "")
         yield (
             f"neighbouring residuals are alike (correlation {goodness.correlation:.2f}): the process has more dynamics than this "

@@ -76,6 +76,7 @@ def intervals(test: BumpTest, found: Optimum, goodness: Goodness) -> dict[str, I
     """Return intervals that hold the true numbers with a probability of 95 %, where the model is true, by linear theory.
 
     The noise counts as a first-order autoregression with the correlation of the residuals; lags have intervals of their logarithms.
+    Two lags that could as well be equal are no linear case: their intervals are too narrow then.
     """
     slopes = _slopes(test, found)
     names = ["gain", "start", *(["drift"] if found.drift else []), *_lag_names(found), "delay"]

@@ -33,6 +33,8 @@ _LONGEST: Final = 100.0
 """Longest lag, in lengths of the record."""
 _SHORTEST: Final = 0.01
 """Shortest lag, in times between samples."""
+_NONE: Final = 1e-9
+"""Dead time, in times between samples, that is rounding."""
 _FEW_MOVES: Final = 10
 """Moves of the output up to which the kinks are far apart."""
 _PIECES: Final = 6
@@ -132,13 +134,14 @@ class Search:
 
     def _at(self, x: Floats) -> Optimum:
         lags = tuple(sorted(np.exp(x[:-1]).tolist(), reverse=True))
-        columns = self.columns(lags, float(x[-1]))
+        delay = float(x[-1]) if x[-1] > _NONE * max(1.0, self._test.spacing) else 0.0
+        columns = self.columns(lags, delay)
         size = np.abs(columns).max(axis=0)
         size[size == 0] = 1.0
         first = self._test.measurement[0]
         weights = np.linalg.lstsq(columns / size, self._test.measurement - first, rcond=None)[0] / size
         gain, start, drift = (*weights.tolist(), 0.0)[:3]
-        return Optimum(gain, lags, float(x[-1]), start + float(first), drift)
+        return Optimum(gain, lags, delay, start + float(first), drift)
 
 
 def _thinned(test: BumpTest) -> BumpTest:

@@ -71,7 +71,7 @@ def read_curve(test: BumpTest, *, by_point: bool) -> Optimum:
         lag = _crossing(test, start + _POINT * change, width) - when - delay
     if not lag > 0:
         raise FitRefusedError(f"the curve has no lag that a tangent could show: it is over within a sample; {_ELSE} one")
-    return Optimum(change / size, (lag,), max(0.0, delay), start, 0.0)
+    return Optimum(change / size, (lag,), delay if delay > 1e-9 else 0.0, start, 0.0)
 
 
 def read_slopes(test: BumpTest) -> Optimum:
@@ -95,7 +95,7 @@ def read_slopes(test: BumpTest) -> Optimum:
         )
     meet = (before.value - before.slope * before.time - after.value + after.slope * after.time) / bend
     start = before.value + before.slope * (float(t[0]) - before.time)
-    return Optimum(bend / size, (), max(0.0, meet - when), start, before.slope)
+    return Optimum(bend / size, (), meet - when if meet - when > 1e-9 else 0.0, start, before.slope)
 
 
 def _single(test: BumpTest) -> tuple[float, float]:
