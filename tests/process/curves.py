@@ -44,7 +44,7 @@ def step_response(process: Process, t: Floats) -> Floats:
     """Return the step response without dead time, 0 before the step: an integrator, distinct lags, or two equal ones."""
     after: Floats = np.maximum(t, 0.0)
     if process.integrators:
-        return process.gain * after
+        return np.asarray(process.gain * after, dtype=np.float64)
     lags = [-1 / p.real for p in process.poles]
     if len(lags) == 2 and lags[0] == lags[1]:
         return np.asarray(process.gain * (1 - (1 + after / lags[0]) * np.exp(-after / lags[0])), dtype=np.float64)
@@ -52,9 +52,9 @@ def step_response(process: Process, t: Floats) -> Floats:
     for T in lags:
         others = math.prod(T - x for x in lags if x != T)
         found -= T ** (len(lags) - 1) / others * np.exp(-after / T)
-    return process.gain * found
+    return np.asarray(process.gain * found, dtype=np.float64)
 
 
 def held(time: Floats, steps: Sequence[tuple[float, float]], rest: float = 50.0) -> Floats:
     """Return an output that steps at some times by some sizes."""
-    return rest + sum((size * (time >= when) for when, size in steps), np.zeros(time.size))
+    return np.asarray(rest + sum((size * (time >= when) for when, size in steps), np.zeros(time.size)), dtype=np.float64)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -56,20 +55,23 @@ class Search:
         How many lags; none for an integrator.
     drifts : bool
         Whether the measurement drifts.
+    at : ndarray of int, optional
+        The samples of the measurement that count; by default all.
     """
 
-    def __init__(self, test: BumpTest, order: int, drifts: bool) -> None:
-        self.order, self._test = order, test
+    def __init__(self, test: BumpTest, order: int, drifts: bool, at: npt.NDArray[np.intp] | None = None) -> None:
+        self.order, self.drifts, self._test = order, drifts, test
         self._held = HeldOutput.from_samples(test.time, test.output)
-        since = test.time - test.time[0]
+        self._time, self._measurement = (test.time, test.measurement) if at is None else (test.time[at], test.measurement[at])
+        since = self._time - test.time[0]
         self._fixed = np.column_stack([np.ones(since.size), since][: 1 + drifts])
         self._basis = np.ascontiguousarray(np.linalg.qr(self._fixed / np.abs(self._fixed).max(axis=0))[0].T)
-        self._measured = self._without_fixed(test.measurement - test.measurement[0])
+        self._measured = self._without_fixed(self._measurement - self._measurement[0])
         self._shortest, self._longest = _SHORTEST * test.spacing, _LONGEST * float(since[-1])
 
     def optimum(self) -> Optimum:
         """Return the best model."""
-        few = self if self._test.time.size <= 2 * _ENOUGH else Search(_thinned(self._test), self.order, self._fixed.shape[1] > 1)
+        few = self if self._time.size <= 2 * _ENOUGH else Search(self._test, self.order, self.drifts, _some(self._test))
         _, start = min((few._follow(x, 0.0, self._test.duration) for x in few._starts()), key=lambda x: x[0])
         best = self._follow(start, 0.0, self._test.duration)
         for low, high in self._pieces(float(best[1][-1])):
@@ -79,7 +81,7 @@ class Search:
 
     def columns(self, lags: Sequence[float], delay: float) -> Floats:
         """Return the responses of a model with the gain 1, and those of start and drift: shape (n, 2) or (n, 3)."""
-        return np.column_stack([self._held.response(self._test.time - delay, lags), self._fixed])
+        return np.column_stack([self._held.response(self._time - delay, lags), self._fixed])
 
     def _without_fixed(self, values: Floats) -> Floats:
         for column in self._basis:
@@ -88,7 +90,7 @@ class Search:
 
     def _residuals(self, x: Floats) -> Floats:
         """Return what is left of the measurement with the best gain, start and drift, for logarithms of lags and a dead time."""
-        response = self._without_fixed(self._held.response(self._test.time - x[-1], np.exp(x[:-1]).tolist()))
+        response = self._without_fixed(self._held.response(self._time - x[-1], np.exp(x[:-1]).tolist()))
         power = dot(response, response)
         return np.asarray(self._measured - response * (dot(response, self._measured) / power)) if power > 0 else self._measured
 
@@ -124,7 +126,7 @@ class Search:
         """Yield the pieces between the kinks near a dead time."""
         if self.order == 2 or self._held.count > _FEW_MOVES:
             return
-        time = self._test.time
+        time = self._time
         kinks = np.unique(np.concatenate([[0.0], *(_near(time - move, delay, _PIECES + 2) for move in self._held.times)]))
         kinks = kinks[(kinks >= 0) & (kinks <= self._test.duration)]
         around = int(np.searchsorted(kinks, delay))
@@ -138,33 +140,19 @@ class Search:
         columns = self.columns(lags, delay)
         size = np.abs(columns).max(axis=0)
         size[size == 0] = 1.0
-        first = self._test.measurement[0]
-        weights = np.linalg.lstsq(columns / size, self._test.measurement - first, rcond=None)[0] / size
+        first = self._measurement[0]
+        weights = np.linalg.lstsq(columns / size, self._measurement - first, rcond=None)[0] / size
         gain, start, drift = (*weights.tolist(), 0.0)[:3]
         return Optimum(gain, lags, delay, start + float(first), drift)
 
 
-def _thinned(test: BumpTest) -> BumpTest:
-    """Return some samples of a long record: evenly over it, and ever farther apart after each of its first moves.
-
-    The output keeps its moves: each sample has the level that held before the next one.
-    """
+def _some(test: BumpTest) -> npt.NDArray[np.intp]:
+    """Return some samples of a long record: evenly over it, and ever farther apart after each of its first moves."""
     n = test.time.size
-    moves = np.flatnonzero(np.diff(test.output)) + 1
-    if moves.size > _ENOUGH // 4:
-        return test
-    kept = [np.linspace(0, n - 1, _ENOUGH), moves, moves - 1]
-    after = np.geomspace(1, n, _ENOUGH // min(moves.size, _FEW_MOVES))
-    kept += [move + after for move in moves[:_FEW_MOVES]]
-    at = np.unique(np.clip(np.concatenate(kept).astype(int), 0, n - 1))
-    return replace(
-        test,
-        time=test.time[at],
-        output=test.output[at],
-        measurement=test.measurement[at],
-        setpoint=None,
-        first=int(np.searchsorted(at, test.first)),
-    )
+    moves = np.flatnonzero(np.diff(test.output))[:_FEW_MOVES] + 1
+    after = np.geomspace(1, n, _ENOUGH // moves.size)
+    kept = [np.linspace(0, n - 1, _ENOUGH), *(move + after for move in moves)]
+    return np.unique(np.clip(np.concatenate(kept).astype(np.intp), 0, n - 1))
 
 
 def _near(candidates: Floats, x: float, most: int) -> Floats:
