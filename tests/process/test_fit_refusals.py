@@ -24,7 +24,7 @@ def refused(kind: type[PidemuError], message: str, *columns: Any, **how: Any) ->
 def test_a_bump_test_without_a_bump_is_refused() -> None:
     refused(
         FitRefusedError,
-        "the output stays at 10: without a bump there is nothing to fit; move the output in manual by some percent and record until",
+        "the output stays at 10: without a bump there is nothing to fit; move the output in manual by some percent and record",
         T, np.full(T.size, 10.0), Y,
     )  # fmt: skip
 

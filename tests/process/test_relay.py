@@ -53,7 +53,7 @@ def test_a_process_of_first_order_is_found_again_whatever_the_limits(
     found = relay_test(process, 5, wide * abs(gain), output=output, limits=(0, 100))
     if math.exp(-delay / lag) > 1e-4:  # else the measurement has all but settled, and shows no lag
         assert numbers(found.process) == pytest.approx((gain, lag, delay), rel=1e-6)
-    assert (len(found.notes) > 0) == (output != 50)
+        assert (len(found.notes) > 0) == (output != 50)
 
 
 @given(gain=st.floats(0.01, 1) | st.floats(-1, -0.01), delay=st.floats(0.1, 20), wide=st.floats(0, 1))
