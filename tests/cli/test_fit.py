@@ -107,6 +107,9 @@ def test_a_record_without_times_takes_the_interval_that_is_given(folder: Path) -
     rows = [f"{a},{b}" for a, b in zip(u.tolist(), y.tolist(), strict=True)]
     (folder / "x.csv").write_text("\n".join(["op,pv", *rows]), encoding="utf-8")
     assert told("fit", "x.csv", "--scan", "500 ms") == told("fit", CURVE)
+    rows = [f"{'' if i % 3 else 0.5},{row}" for i, row in enumerate(rows)]
+    (folder / "y.csv").write_text("\n".join(["dt,op,pv", *rows]), encoding="utf-8")
+    assert told("fit", "y.csv", "--scan", "500 ms") == told("fit", CURVE)
     assert said("fit", "x.csv").err == "error: x.csv: no column 'time'; add one, or give the time between samples with --scan\n"
 
 
@@ -139,6 +142,8 @@ def test_a_closed_loop_is_known_by_its_mode_column(folder: Path) -> None:
 
 WRONG = {
     "fit none.csv": "none.csv: cannot be read: No such file or directory",
+    "fit back.csv": "back.csv: time: sample 3, 1 s, goes back from 2 s; give samples in the order of their times, one for each",
+    "fit gaps.csv": "gaps.csv: the column interval has empty cells; give the usual time between samples with --scan",
     "fit no_output.csv": "no_output.csv:1: no column 'output' among time, pv",
     f"fit {CURVE} --from 500": f"{CURVE}: no sample between --from and --to; the record is from 0 s to 119.5 s",
     f"fit {CURVE} --plot x.gif": "x.gif: pictures are written as .png or .svg; give the file such an ending",
@@ -156,6 +161,9 @@ WRONG = {
 
 @pytest.mark.parametrize("line", WRONG)
 def test_wrong_usage_is_told_with_exit_status_2(folder: Path, line: str) -> None:
+    rows = [f"{t},{40 + 5 * (t > 4)},{t}" for t in (0, 2, 1, *range(3, 20))]
+    (folder / "back.csv").write_text("\n".join(["time,op,pv", *rows]), encoding="utf-8")
+    (folder / "gaps.csv").write_text("\n".join(["dt,op,pv", "1,40,2", "1,40,2", ",45,2"]), encoding="utf-8")
     (folder / "no_output.csv").write_text("time,pv\n0,1\n1,2\n", encoding="utf-8")
     result = said(*line.split())
     assert (result.status, result.out, result.err) == (2, "", f"error: {WRONG[line]}\n")

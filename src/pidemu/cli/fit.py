@@ -17,7 +17,7 @@ from pidemu.process.fit.document import plain_refusal
 from pidemu.process.fit.fit import METHODS, MODELS, Method, Model, ProcessFit, fit_process
 from pidemu.process.process import Process
 from pidemu.process.text import written
-from pidemu.records.files import Record, read_record
+from pidemu.records.files import Floats, Record, read_record
 from pidemu.records.playback import times_of
 from pidemu.settings.ranges import PERCENT, SignalRange
 
@@ -81,12 +81,14 @@ def command(
     ranges = None if pv_range is None and op_range is None else (pv_range or PERCENT, op_range or PERCENT)
     unit = "%/%" if ranges is None else "/".join(given.unit or "eu" for given in ranges)
     try:
-        found = _fit(record, file, scan, (begin, end), model=model, method=method, drift=drift, unit=unit)
+        found = _fit(record, scan, (begin, end), model=model, method=method, drift=drift, unit=unit)
     except FitRefusedError as error:
         if as_json:
             print_json(plain_refusal(str(error)))
         echo(f"error: {visible(file)}: {error}", err=True)
         raise SystemExit(1) from None
+    except RecordError as error:
+        raise RecordError(f"{visible(file)}: {error}") from None
     percent = None if ranges is None else found.process.in_percent(*ranges)
     if as_json:
         more = {} if percent is None else {"percent": plain_process(percent)}
@@ -101,24 +103,33 @@ def command(
         plot_fit(picture, found)
 
 
-def _fit(record: Record, file: str, scan: float | None, window: tuple[float | None, float | None], **how: Any) -> ProcessFit:
+def _fit(record: Record, scan: float | None, window: tuple[float | None, float | None], **how: Any) -> ProcessFit:
     if record.output is None:
-        raise RecordError(f"{visible(file)}: no output; add the column output")
-    if record.time is None and record.interval is None and scan is None:
-        raise RecordError(f"{visible(file)}: no column 'time'; add one, or give the time between samples with --scan")
-    times = times_of(record, scan or 1.0, record.interval)
+        raise RecordError("no output; add the column output")
+    times = _times(record, scan)
     begin, end = window
     inside = (times >= (-np.inf if begin is None else begin)) & (times <= (np.inf if end is None else end))
     if not inside.any():
-        raise RecordError(
-            f"{visible(file)}: no sample between --from and --to; the record is from {times[0]:g} s to {times[-1]:g} s"
-        )
+        raise RecordError(f"no sample between --from and --to; the record is from {times[0]:g} s to {times[-1]:g} s")
     columns: dict[str, Any] = {}
     if "sp" in record.names:
         columns["setpoint"] = record.sp[inside]
     if record.auto is not None:
         columns["auto"] = record.auto[inside]
     return fit_process(times[inside], record.output[inside], record.pv[inside], **columns, **how)
+
+
+def _times(record: Record, scan: float | None) -> Floats:
+    """Return the times of the samples [s], from whichever column has them; `scan` fills what is missing."""
+    if record.time is not None:
+        return record.time
+    if record.interval is None and scan is None:
+        raise RecordError("no column 'time'; add one, or give the time between samples with --scan")
+    usual = np.nan if scan is None else scan
+    interval = None if record.interval is None else np.where(np.isnan(record.interval), usual, record.interval)
+    if interval is not None and np.isnan(interval[1:]).any():
+        raise RecordError("the column interval has empty cells; give the usual time between samples with --scan")
+    return times_of(record, usual, interval)
 
 
 def _print(found: ProcessFit, percent: Process | None) -> None:
