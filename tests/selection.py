@@ -9,7 +9,8 @@ FOLDER: Final = Path(__file__).parent
 
 SLOW: Final = (
     "card/test_broken_folders.py", "card/test_mutations.py", "card/test_source.py", "checks/test_wrong_cards.py",
-    "cli/test_cards_show_check.py", "cli/test_convert.py", "cli/test_convert_certificate.py", "cli/test_fleet.py",
+    "cli/test_cards_show_check.py", "cli/test_convert.py", "cli/test_convert_certificate.py", "cli/test_fit.py",
+    "cli/test_fleet.py", "process/test_fit_noise.py",
     "cli/test_matrix.py", "cli/test_start.py", "cli/test_streams.py", "cli/test_verify.py", "certificate/test_exact_law.py",
     "certificate/test_figures.py", "certificate/test_nonlinear.py", "certificate/test_proof.py",
     "conversion/test_adversarial.py", "conversion/test_adversarial_settings.py", "conversion/test_all_pairs.py",

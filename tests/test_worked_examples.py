@@ -381,6 +381,11 @@ def test_the_record_is_what_its_script_writes() -> None:
     assert script["record"]() == RECORD.read_text(encoding="utf-8")
 
 
+def test_the_bump_test_is_what_its_script_writes() -> None:
+    script = runpy.run_path(str(ROOT / "examples" / "make_bump.py"))
+    assert script["record"]() == (ROOT / "examples" / "bump.csv").read_text(encoding="utf-8")
+
+
 def test_the_record_has_a_setpoint_step_a_load_and_a_manual_spell() -> None:
     record = read_record(RECORD)
     assert record.auto is not None

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         CardError,
         CertificateError,
         EngineError,
+        FitRefusedError,
         FleetError,
         PidemuError,
         ProcessError,
@@ -39,7 +40,11 @@ if TYPE_CHECKING:
     from pidemu.fleet.result import FleetResult
     from pidemu.fleet.table import LoopTable, read_loops
     from pidemu.law.law import Law
+    from pidemu.process.batch import test_batch
+    from pidemu.process.fit.fit import ProcessFit, fit_process
     from pidemu.process.process import Process
+    from pidemu.process.reduction import half_rule
+    from pidemu.process.relay import RelayTest, relay_test
     from pidemu.records.compare import Comparison, compare
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
@@ -67,6 +72,7 @@ _HOMES = {
     "CertificateError": "errors",
     "ConversionRefusedError": "conversion.refused",
     "EngineError": "errors",
+    "FitRefusedError": "errors",
     "FleetError": "errors",
     "PidemuError": "errors",
     "ProcessError": "errors",
@@ -85,6 +91,12 @@ _HOMES = {
     "read_loops": "fleet.table",
     "Law": "law.law",
     "Process": "process.process",
+    "ProcessFit": "process.fit.fit",
+    "RelayTest": "process.relay",
+    "fit_process": "process.fit.fit",
+    "half_rule": "process.reduction",
+    "relay_test": "process.relay",
+    "test_batch": "process.batch",
     "Record": "records.files",
     "read_record": "records.files",
     "Settings": "settings.settings",
@@ -105,6 +117,7 @@ __all__ = [
     "EngineError",
     "Event",
     "Explanation",
+    "FitRefusedError",
     "Fleet",
     "FleetError",
     "FleetResult",
@@ -114,11 +127,13 @@ __all__ = [
     "PidemuError",
     "Process",
     "ProcessError",
+    "ProcessFit",
     "Question",
     "QuestionError",
     "Reading",
     "Record",
     "RecordError",
+    "RelayTest",
     "ScanError",
     "SettingError",
     "Settings",
@@ -130,11 +145,15 @@ __all__ = [
     "compare",
     "convert",
     "explain",
+    "fit_process",
+    "half_rule",
     "load_card",
     "read_loops",
     "read_record",
     "readings",
+    "relay_test",
     "simulate",
+    "test_batch",
     "verify",
 ]
 

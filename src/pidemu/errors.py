@@ -13,6 +13,7 @@
     ├── EngineError          a back end is not there, or cannot run what it is asked to
     ├── FleetError           a fleet of loops cannot be read or run as asked
     ├── RecordError          a recorded signal file cannot be used
+    │   └── FitRefusedError  a record tells nothing about the process
     ├── CertificateError     a file is not the certificate of a conversion, so that it cannot be verified
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
@@ -155,6 +156,10 @@ class FleetError(PidemuError):
 
 class RecordError(PidemuError):
     """A file of recorded signals cannot be used."""
+
+
+class FitRefusedError(RecordError):
+    """A record tells nothing, or nothing true, about the process: no bump, no answer, a closed loop."""
 
 
 class CertificateError(PidemuError):

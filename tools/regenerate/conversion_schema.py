@@ -95,7 +95,9 @@ def schema() -> dict[str, Any]:
     definitions["ConversionPart"]["properties"]["certificate"] = reference
     definitions["TextbookPart"]["properties"]["certificate"] = {"anyOf": [reference, {"type": "null"}]}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": SCHEMA}
-    found: dict[str, Any] = _without_titles({**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions})
+    found: dict[str, Any] = without_titles(
+        {**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions}, SCHEMA
+    )
     return found
 
 
@@ -132,11 +134,11 @@ def _numbers(node: Any) -> Any:
     return [_numbers(v) for v in node] if isinstance(node, list) else node
 
 
-def _without_titles(node: Any) -> Any:
-    """Remove the titles that repeat a property's name."""
+def without_titles(node: Any, title: str) -> Any:
+    """Remove the titles that repeat a property's name; only the document's own stays."""
     if isinstance(node, dict):
-        return {k: _without_titles(v) for k, v in node.items() if k != "title" or not isinstance(v, str) or v == SCHEMA}
-    return [_without_titles(v) for v in node] if isinstance(node, list) else node
+        return {k: without_titles(v, title) for k, v in node.items() if k != "title" or not isinstance(v, str) or v == title}
+    return [without_titles(v, title) for v in node] if isinstance(node, list) else node
 
 
 def text() -> str:

@@ -9,7 +9,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
-from tools.regenerate import card_reference, card_schema, conversion_schema, emulation, matrix, pages, tables
+from tools.regenerate import card_reference, card_schema, conversion_schema, emulation, matrix, pages, process_schemas, tables
 from tools.regenerate.pages import ROOT
 
 _SHOWN: Final = 160
@@ -45,6 +45,8 @@ _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/card.schema.json", lambda _: card_schema.text()),
     Generated("specs/card-language.md", card_reference.updated),
     Generated("specs/conversion.schema.json", lambda _: conversion_schema.text()),
+    Generated("specs/fit.schema.json", lambda _: process_schemas.fit_text()),
+    Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),
     Generated("docs/matrix.md", lambda _: matrix.page()),

@@ -22,6 +22,8 @@ _COMMANDS: Final = {
     "run": "Run a card on recorded signals.",
     "compare": "Run cards on the same signals and compare their outputs.",
     "simulate": "Run a card in a closed loop with a process.",
+    "fit": "Fit a process to the record of a bump test.",
+    "relay": "Put a relay in place of the controller, and read the oscillation.",
     "fleet": "Run a file of closed loops, on all cores or on a cluster.",
     "matrix": "Convert typical settings of every card to every card.",
     "verify": "Compute a signed certificate again, and say what changed.",

@@ -141,14 +141,14 @@ def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], dela
     """Return the sampled model; see `pidemu.Process.sampled`."""
     if not (math.isfinite(h) and h > 0):
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
-    A, B = _chain(poles)
-    row, through = _outputs(poles, zeros)
+    A, B = chain(poles)
+    row, through = outputs(poles, zeros)
     scans = math.floor(delay / h + _WHOLE)
     fraction = delay - scans * h
     if fraction < _WHOLE * h:
         fraction = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
-        (whole, after, _), (_, late, begun) = _expm1(A, B, (h, h - fraction, fraction))
+        (whole, after, _), (_, late, begun) = expm1(A, B, (h, h - fraction, fraction))
         early = begun + after @ begun
     if not all(np.isfinite(x).all() for x in (whole, late, early)):
         raise ProcessError(f"the process outgrows all numbers within one scan of {h:g} s; give a shorter scan interval")
@@ -160,7 +160,7 @@ def _in_order(poles: Sequence[complex]) -> list[complex]:
     return sorted((p for p in poles if p.imag >= 0), key=abs, reverse=True)
 
 
-def _chain(poles: Sequence[complex]) -> tuple[Floats, Floats]:
+def chain(poles: Sequence[complex]) -> tuple[Floats, Floats]:
     """Return A and B of first- and second-order sections in a row, each with the low-frequency gain 1."""
     n = len(poles)
     A, B = np.zeros((n, n)), np.zeros(n)
@@ -180,7 +180,7 @@ def _chain(poles: Sequence[complex]) -> tuple[Floats, Floats]:
     return A, B
 
 
-def _outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats, float]:
+def outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats, float]:
     """Return what of the states makes the numerator, and what is left at once: division by one section after the other."""
     rest = np.array(polynomial_of(zeros))
     row: list[float] = []
@@ -191,7 +191,7 @@ def _outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats
     return np.array(row, dtype=np.float64), float(rest[0])
 
 
-def _expm1(A: Floats, B: Floats, times: Sequence[float]) -> tuple[Floats, Floats]:
+def expm1(A: Floats, B: Floats, times: Sequence[float]) -> tuple[Floats, Floats]:
     """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B`` for several times, by series and doubling.
 
     ``F(2t) = 2 F(t) + F(t)^2``: nothing cancels in that, as it would in the squaring of ``exp(A t)``.

@@ -1,14 +1,14 @@
 """Process models: gain, poles, zeros and dead time (specs/equations.md, section 9, point 6).
 
 A process is ``P(s) = gain * prod(1 - s/z)/prod(1 - s/p) * exp(-delay s)``, from the controller's output to its measurement, both
-in percent of their ranges.
+in percent of their ranges, where its gain has no other unit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -21,7 +21,9 @@ from pidemu.law.rational import Rational, Response
 from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
 from pidemu.process.hold import SampledProcess, sample
 from pidemu.process.roots import count, factors, in_pairs, joined, poles_of, polynomial_of, zeros_of
-from pidemu.process.text import read
+from pidemu.process.text import PERCENT, gain_unit, read
+from pidemu.settings.ranges import PERCENT as RANGE
+from pidemu.settings.ranges import RangeGiven, read_range
 
 _DECADES: Final = 6
 """How far beyond the process's own frequencies a phase of -180 degrees is looked for."""
@@ -41,12 +43,15 @@ class Process:
         pairs.
     delay : float
         Dead time [s].
+    unit : str
+        Unit of the gain, apart from the 1/s of an integrator: ``%/%``, or units of the measurement per unit of the output, such as
+        ``degC/%``. A loop is computed in percent: `in_percent`.
 
     Raises
     ------
     ProcessError
         A number is not finite or not one that a process has (`pidemu.plausible`), a complex root stands alone, there are more zeros
-        than poles or more poles than 20, the gain is zero or the dead time negative.
+        than poles or more poles than 20, the gain is zero or the dead time negative, the unit is none of one unit per another.
 
     Examples
     --------
@@ -63,8 +68,10 @@ class Process:
     poles: Sequence[complex] = ()
     zeros: Sequence[complex] = ()
     delay: float = 0.0
+    unit: str = PERCENT
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", gain_unit(self.unit))
         for name, quantity in (("gain", GAIN), ("delay", PROCESS_TIME)):
             object.__setattr__(self, name, plausible(name, getattr(self, name), quantity, ProcessError))
         for name in ("poles", "zeros"):
@@ -83,7 +90,13 @@ class Process:
 
     @classmethod
     def from_lags(
-        cls, gain: float, lags: Iterable[float] = (), leads: Iterable[float] = (), integrators: int = 0, delay: float = 0.0
+        cls,
+        gain: float,
+        lags: Iterable[float] = (),
+        leads: Iterable[float] = (),
+        integrators: int = 0,
+        delay: float = 0.0,
+        unit: str = PERCENT,
     ) -> Process:
         """Return ``gain prod(1 + lead s)/(s^integrators prod(1 + lag s)) exp(-delay s)``.
 
@@ -97,13 +110,66 @@ class Process:
             How many.
         delay : float
             Dead time [s].
+        unit : str
+            Unit of the gain.
 
         Raises
         ------
         ProcessError
             A lag is not positive, a lead is zero, or what `Process` refuses.
         """
-        return cls(gain, poles_of(lags, count(integrators)), zeros_of(leads), delay)
+        return cls(gain, poles_of(lags, count(integrators)), zeros_of(leads), delay, unit)
+
+    def in_percent(self, pv_range: RangeGiven, op_range: RangeGiven = RANGE) -> Process:
+        """Return the process with its gain in %/%.
+
+        Parameters
+        ----------
+        pv_range, op_range : range
+            What 0 and 100 % of measurement and output are, such as ``(0, 400, "degC")``.
+
+        Raises
+        ------
+        ProcessError
+            A range has another unit than the gain.
+
+        Examples
+        --------
+        >>> print(Process(2, [-0.1], unit="degC/%").in_percent("0,400 degC"))
+        0.5/(10 s + 1)
+        """
+        ranges = [read_range(given) for given in (pv_range, op_range)]
+        for what, unit, given in zip(("measurement", "output"), self.unit.rsplit("/", 1), ranges, strict=True):
+            if given.unit not in ("", unit):
+                raise ProcessError(
+                    f"the gain of {self} is in {self.unit}, and the range of the {what}, {given}, in another; give it in {unit}"
+                )
+        pv, op = (given.span for given in ranges)
+        return replace(self, gain=self.gain * op / pv, unit=PERCENT)
+
+    def rounded(self, digits: int = 6) -> Process:
+        """Return the process with so many significant digits of gain, lags and leads, and dead time, as they are printed."""
+
+        def short(x: complex) -> complex:
+            if x.imag:
+                return complex(short(x.real).real, short(x.imag).real)
+            return complex(float(f"{x.real:.{digits}g}"))
+
+        poles, zeros = ([r and (short(r) if r.imag else 1 / short(1 / r)) for r in roots] for roots in (self.poles, self.zeros))
+        return Process(short(self.gain + 0j).real, poles, zeros, short(self.delay + 0j).real, self.unit)
+
+    def check_percent(self) -> None:
+        """Refuse a process whose gain is not in %/%, for a loop that is computed in percent.
+
+        Raises
+        ------
+        ProcessError
+            It is not.
+        """
+        if self.unit != PERCENT:
+            raise ProcessError(
+                f"the gain of {self} is in {self.unit}, and a loop is computed in %/%; give process.in_percent(pv_range)"
+            )
 
     def response(self, w: npt.ArrayLike) -> Response:
         """Return the frequency response, the dead time exact.
@@ -217,18 +283,19 @@ class Process:
     def text(self) -> str:
         """The transfer function, as people write it."""
         wait = "" if not self.delay else "exp(-s)" if self.delay == 1 else f"exp(-{self.delay:g} s)"
+        unit = "" if self.unit == PERCENT else f" [{self.unit}]"
         numerator = " ".join(part for part in (f"{self.gain:g}", joined(factors(self.zeros)), wait) if part)
         below = factors(self.poles)
         if not below:
-            return numerator
+            return numerator + unit
         bottom = below[0] if len(below) == 1 else f"({joined(below)})"
-        return f"{numerator}/{bottom}"
+        return f"{numerator}/{bottom}{unit}"
 
     def __str__(self) -> str:
         return self.text
 
 
-def parse_process(text: str) -> Process:
+def parse_process(text: str, *, any_unit: bool = False) -> Process:
     """Read a process as it is written on a command line.
 
     Parameters
@@ -237,6 +304,8 @@ def parse_process(text: str) -> Process:
         ``NAME=VALUE``, comma-separated: ``gain`` [%/%], ``lag`` and ``lead`` (time constants), ``integrators``, ``delay``, ``pole``
         and ``zero`` [rad/s]. Lags, leads, poles and zeros may come more than once; times are in seconds or have a unit; a complex
         pole or zero brings its conjugate along.
+    any_unit : bool
+        Whether the gain may have another unit than %/%, such as ``gain=2 degC/%``.
 
     Raises
     ------
@@ -248,4 +317,8 @@ def parse_process(text: str) -> Process:
     >>> print(parse_process("gain=1.5, lag=10, lag=2 min, delay=3"))
     1.5 exp(-3 s)/((10 s + 1)(120 s + 1))
     """
-    return Process(*read(text))
+    process = Process(*read(text))
+    if process.unit != PERCENT and not any_unit:
+        given = text.partition("gain")[2].partition("=")[2].partition(",")[0].strip()
+        raise ProcessError(f"gain={given}: a process gain is in %/% of the signal ranges; convert it and leave out the unit")
+    return process

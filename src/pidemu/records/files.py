@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -104,7 +104,7 @@ class Record:
         return self.output if self.manual is None else self.manual
 
 
-def read_record(path: str | Path) -> Record:
+def read_record(path: str | Path, needed: Sequence[str] = ("sp", "pv")) -> Record:
     """Read a CSV file with a header line; lines above it that begin with ``# ``, or are just ``#``, are comments.
 
     The cells are separated by commas, or by semicolons or tabs where the header line has these.
@@ -118,6 +118,8 @@ def read_record(path: str | Path) -> Record:
     ----------
     path : path
         The file.
+    needed : sequence of str
+        Columns that it must have, by the names above. A setpoint or measurement that it need not have, and has not, is NaN.
 
     Raises
     ------
@@ -127,10 +129,10 @@ def read_record(path: str | Path) -> Record:
     lines = split_lines(read_text(path, RecordError, _KIND))
     shown = visible(str(path))
     if len(lines.rows) < 2:
-        raise RecordError(f"{shown}: no samples; a record has a header line such as sp,pv and one line per scan")
+        raise RecordError(f"{shown}: no samples; a record has a header line such as {','.join(needed)} and one line per scan")
     table = [(i, _row(f"{shown}:{i}", line, lines.delimiter)) for i, line in lines.rows]
     header = table[0][1]
-    places = _places(shown, table[0][0], header)
+    places = _places(shown, table[0][0], header, needed)
     for i, row in table[1:]:
         if len(row) != len(header):
             remark = "; comments stand above the header" if row[0].startswith("#") else ""
@@ -139,6 +141,8 @@ def read_record(path: str | Path) -> Record:
     for name, at in places.items():
         cells = [(f"{shown}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
         columns[name] = _times(cells) if name == "time" else np.array([_cell(*cell, name) for cell in cells])
+    for name in ("sp", "pv"):
+        columns.setdefault(name, np.full(len(table) - 1, math.nan))
     return Record(
         header=tuple(header),
         rows=tuple(tuple(row) for _, row in table[1:]),
@@ -156,7 +160,7 @@ def _row(where: str, line: str, delimiter: str) -> list[str]:
         raise RecordError(f"{where}: {error}") from None
 
 
-def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
+def _places(path: str, line: int, header: list[str], needed: Sequence[str]) -> dict[str, int]:
     places: dict[str, int] = {}
     for name, words in _COLUMNS.items():
         hits = [i for i, cell in enumerate(header) if cell.casefold() in words]
@@ -164,7 +168,7 @@ def _places(path: str, line: int, header: list[str]) -> dict[str, int]:
             raise RecordError(f"{path}:{line}: columns {', '.join(header[i] for i in hits)} all mean {name}; keep one")
         if hits:
             places[name] = hits[0]
-    for name in ("sp", "pv"):
+    for name in needed:
         if name not in places:
             among = quoted(", ".join(header), 200)
             marked = next((cell for cell in header if cell.startswith("#") and cell[1:].strip().casefold() in _COLUMNS[name]), None)

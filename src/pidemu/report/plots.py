@@ -98,8 +98,8 @@ def plot_run(path: str | Path, settings: Settings, record: Record, playback: Pla
     check_picture(path)
     t, unit = playback.times, "%" if settings.equation.signals == "percent" else "units"
     recorded = record.output is not None and np.isfinite(record.output).any()
-    with _style():
-        figure, axes = _panels((3, 3, 1.2) if recorded else (3, 3), f"{settings.card.id}: {dials(settings)}")
+    with style():
+        figure, axes = panels((3, 3, 1.2) if recorded else (3, 3), f"{settings.card.id}: {dials(settings)}")
         _signals(axes[0], t, record, unit)
         outputs: list[Curve] = [("emulated", playback.outputs, {"color": _COLOURS[1]})]
         if recorded and record.output is not None:
@@ -133,8 +133,8 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
     check_picture(path)
     t, outputs = comparison.times, {visible(label): values for label, values in comparison.outputs.items()}
     first, *others = outputs
-    with _style():
-        figure, axes = _panels((2.4, 3, 2), "\n".join(f"{run.label}: {dials(run.settings)}" for run in comparison.runs))
+    with style():
+        figure, axes = panels((2.4, 3, 2), "\n".join(f"{run.label}: {dials(run.settings)}" for run in comparison.runs))
         _signals(axes[0], t, comparison.record, "%")
         for i, (label, values) in enumerate(outputs.items()):
             look = {"linewidth": 1.2} if i else {"linewidth": 2.6, "alpha": 0.45}
@@ -149,13 +149,15 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
         _finish(figure, axes, t, comparison.record, path)
 
 
-def _style() -> Any:
+def style() -> Any:
+    """Return the context in which all pictures are drawn."""
     from matplotlib import rc_context
 
     return rc_context(_STYLE)  # type: ignore[arg-type]
 
 
-def _panels(heights: Sequence[float], title: str) -> tuple[Figure, list[Axes]]:
+def panels(heights: Sequence[float], title: str) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels above each other, of these heights, under a title of a few lines."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -244,6 +246,17 @@ def _finish(figure: Figure, axes: Sequence[Axes], t: Floats, record: Record, pat
             axis.legend(handles, names, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4, fontsize=8)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(float(t[0]), _end(t))
+    save(figure, path)
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a picture; the same one gives the same file.
+
+    Raises
+    ------
+    PidemuError
+        The file cannot be written.
+    """
     svg = Path(path).suffix.lower() == ".svg"
     with beside(path, PidemuError, binary=True) as stream:
         figure.savefig(stream, format="svg" if svg else "png", dpi=150, metadata={"Date": None} if svg else None)

@@ -133,6 +133,7 @@ def trial(
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
 ) -> Trial:
     """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
+    process.check_percent()
     h = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
     if not h > 0:
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")

@@ -1,0 +1,42 @@
+"""The form of a process in JSON, as a model: what the documents of fits and relay experiments share."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from pidemu.process.process import Process
+from pidemu.process.text import written
+
+Number = float | Literal["inf", "-inf", "nan"]
+"""JSON has no infinity: it is written as a word."""
+
+
+class DocumentPart(BaseModel):
+    """A part of the document; what it does not name is not in it."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+
+
+class ProcessPart(DocumentPart):
+    """A process."""
+
+    gain: float = Field(description="Gain [unit], per second too for an integrator.")
+    unit: str = Field(description="Unit of the gain: of the measurement per unit of the output.")
+    lags: list[float] = Field(description="Time constants [s], the largest first.")
+    integrators: int
+    delay: float = Field(description="Dead time [s].")
+    text: str = Field(description="The process as `--process` takes it.")
+
+
+def plain_process(process: Process) -> dict[str, Any]:
+    """Return a process with real lags as plain values."""
+    return {
+        "gain": process.gain,
+        "unit": process.unit,
+        "lags": sorted((-1 / p.real for p in process.poles if p), reverse=True),
+        "integrators": process.integrators,
+        "delay": process.delay,
+        "text": written(process),
+    }
