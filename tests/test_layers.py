@@ -18,7 +18,7 @@ ORDER = [room for line in LAYERS for room in line]
 FACES = {
     ("card", "settings"): {"Settings", "make_settings"},
     ("card", "checks"): {"check"},
-    ("settings", "algorithm"): {"Algorithm", "Lag", "algorithm_of"},
+    ("settings", "algorithm"): {"Algorithm", "algorithm_of"},
     ("settings", "law"): {"Law"},
 }
 """What leads upwards when it is called: `Card.settings`, `Settings.algorithm`, `Settings.law`, and `load_card`, which checks cards

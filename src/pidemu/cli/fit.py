@@ -7,7 +7,8 @@ from typing import Any
 import click
 import numpy as np
 
-from pidemu.cli.common import Output, Range, Time, echo, heading, json_option, number, print_json, table
+from pidemu.arrays import Floats
+from pidemu.cli.common import OutputArgument, RangeArgument, TimeArgument, echo, heading, json_option, number, print_json, table
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.errors import FitRefusedError, RecordError
 from pidemu.excerpt import visible
@@ -17,7 +18,7 @@ from pidemu.process.fit.document import plain_refusal
 from pidemu.process.fit.fit import METHODS, MODELS, Method, Model, ProcessFit, fit_process
 from pidemu.process.process import Process
 from pidemu.process.text import written
-from pidemu.records.files import Floats, Record, read_record
+from pidemu.records.files import Record, read_record
 from pidemu.records.playback import times_of
 from pidemu.settings.ranges import PERCENT, SignalRange
 
@@ -38,20 +39,24 @@ from pidemu.settings.ranges import PERCENT, SignalRange
     show_default=True,
     help="Least squares of all samples; or the curve of one step, read by its tangent (Fit 1) or tangent and 63.2 % point (Fit 2).",
 )
-@click.option("--from", "begin", type=Time(), help="Leave out what is before this time.")
-@click.option("--to", "end", type=Time(), help="Leave out what is after this time.")
-@click.option("--scan", type=Time(positive=True), metavar="H", help="Time between the samples of a record without a time column.")
+@click.option("--from", "begin", type=TimeArgument(), help="Leave out what is before this time.")
+@click.option("--to", "end", type=TimeArgument(), help="Leave out what is after this time.")
+@click.option(
+    "--scan", type=TimeArgument(positive=True), metavar="H", help="Time between the samples of a record without a time column."
+)
 @click.option(
     "--drift/--no-drift",
     default=None,
     help="Fit an even drift of the measurement as well; by default where it plainly drifts before the output first moves.",
 )
 @click.option(
-    "--pv-range", type=Range(), help="Range of the measurement, if it was recorded in its own units: the gain is given in %/%, too."
+    "--pv-range",
+    type=RangeArgument(),
+    help="Range of the measurement, if it was recorded in its own units: the gain is given in %/%, too.",
 )
-@click.option("--op-range", type=Range(), help="Range of the output, if it is not 0 to 100 %.")
+@click.option("--op-range", type=RangeArgument(), help="Range of the output, if it is not 0 to 100 %.")
 @click.option(
-    "--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw record, model and residuals; needs matplotlib."
+    "--plot", "picture", type=OutputArgument(), metavar="FILE.png|svg", help="Draw record, model and residuals; needs matplotlib."
 )
 @json_option
 def command(

@@ -6,7 +6,18 @@ import math
 
 import click
 
-from pidemu.cli.common import Output, Pair, Time, echo, given, heading, json_option, number, print_json, table
+from pidemu.cli.common import (
+    OutputArgument,
+    PairArgument,
+    TimeArgument,
+    echo,
+    given,
+    heading,
+    json_option,
+    number,
+    print_json,
+    table,
+)
 from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
 from pidemu.process.process import parse_process
@@ -27,9 +38,9 @@ from pidemu.process.text import written
 @click.option("--noise", type=float, default=0.0, metavar="SIGMA", help="Standard deviation of the measurement's noise.")
 @click.option("--gain", type=float, metavar="K", help="Static gain for the fitted process; by default the process's own.")
 @click.option("--output", type=float, default=50.0, show_default=True, metavar="U", help="Output at rest.")
-@click.option("--limits", type=Pair(), help="Output limits of the controller; by default none.")
-@click.option("--scan", type=Time(positive=True), help="Interval at which the relay looks; by default it always does.")
-@click.option("--plot", "picture", type=Output(), metavar="FILE.png|svg", help="Draw the oscillation; needs matplotlib.")
+@click.option("--limits", type=PairArgument(), help="Output limits of the controller; by default none.")
+@click.option("--scan", type=TimeArgument(positive=True), help="Interval at which the relay looks; by default it always does.")
+@click.option("--plot", "picture", type=OutputArgument(), metavar="FILE.png|svg", help="Draw the oscillation; needs matplotlib.")
 @json_option
 def command(
     model: str,

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pidemu.certificate.models import Verdict
 from pidemu.conversion.beside import Kind as BesideKind
 from pidemu.conversion.match_method import Match
+from pidemu.files.documents import DocumentPart, Number
 
-Number = float | Literal["inf", "-inf", "nan"]
-"""JSON has no infinity: it is written as a word."""
 Name = Annotated[str, Field(max_length=200)]
 Line = Annotated[str, Field(max_length=2000)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -22,13 +21,7 @@ Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class Part(BaseModel):
-    """A part of the document; what it does not name is not in it."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
-
-
-class Range(Part):
+class Range(DocumentPart):
     """The range of a signal, and what a raw scale stands for."""
 
     low: float
@@ -37,7 +30,7 @@ class Range(Part):
     meaning: Range | None = None
 
 
-class Dial(Part):
+class Dial(DocumentPart):
     """A dial and its value."""
 
     value: Number = Field(description="The value, as it is printed.")
@@ -50,7 +43,7 @@ class TargetDial(Dial):
     unrounded: Number = Field(description="The value before rounding.")
 
 
-class Side(Part):
+class Side(DocumentPart):
     """The settings of one controller."""
 
     card: Name = Field(description="The card's id.")
@@ -67,7 +60,7 @@ class TargetSide(Side):
     lag_on_pv: Number = Field(description="A first-order lag on the measurement that has to stand in front of the block [s].")
 
 
-class AsGiven(Part):
+class AsGiven(DocumentPart):
     """The source as it was given: what it takes to make its settings again."""
 
     card: Name = Field(description="The card's id.")
@@ -78,7 +71,7 @@ class AsGiven(Part):
     lag_on_pv: float = Field(ge=0, allow_inf_nan=False, description="A lag on the measurement in front of the block [s].")
 
 
-class Asked(Part):
+class Asked(DocumentPart):
     """Everything that was asked for, by the names of the arguments of `pidemu.convert`."""
 
     source: AsGiven = Field(alias="from")
@@ -102,7 +95,7 @@ class Asked(Part):
     tag: Line
 
 
-class ConditionPart(Part):
+class ConditionPart(DocumentPart):
     """An unverified fact that the verdict rests on."""
 
     card: Name
@@ -114,7 +107,7 @@ class ConditionPart(Part):
     headline: bool = Field(description="Whether the verdict itself rests on it.")
 
 
-class BesidePart(Part):
+class BesidePart(DocumentPart):
     """Other settings of the target, beside the answer."""
 
     kind: BesideKind
@@ -123,7 +116,7 @@ class BesidePart(Part):
     how: str = Field(description="Words of the command line that give them.")
 
 
-class Ranked(Part):
+class Ranked(DocumentPart):
     """One choice of the target's options."""
 
     changed: dict[Name, str] = Field(description="Options that are not as the card delivers them.")
@@ -133,7 +126,7 @@ class Ranked(Part):
     setpoint: Number | None = Field(default=None, description="The same of the setpoint path.")
 
 
-class TextbookPart(Part):
+class TextbookPart(DocumentPart):
     """What the rule in manuals gives."""
 
     to: Side | None
@@ -141,7 +134,7 @@ class TextbookPart(Part):
     reason: str
 
 
-class FilterPart(Part):
+class FilterPart(DocumentPart):
     """A setpoint filter, by ascending powers of s."""
 
     numerator: list[Number]
@@ -149,14 +142,14 @@ class FilterPart(Part):
     text: str
 
 
-class ActionPart(Part):
+class ActionPart(DocumentPart):
     """The loop's action."""
 
     action: Literal["reverse", "direct"] | None = Field(description="Null where it is not known.")
     text: str = Field(description="What to set on the target, with the error formula.")
 
 
-class BenchCheckPart(Part):
+class BenchCheckPart(DocumentPart):
     """A check at the controller before the cut-over; signs as they are seen."""
 
     text: str
@@ -168,14 +161,14 @@ class BenchCheckPart(Part):
     action: Literal["reverse", "direct"] | None
 
 
-class PlanStep(Part):
+class PlanStep(DocumentPart):
     """One step of a cut-over."""
 
     do: str
     set: dict[Name, Any]
 
 
-class Plan(Part):
+class Plan(DocumentPart):
     """How to change over without a bump."""
 
     steps: list[PlanStep]
@@ -188,7 +181,7 @@ class Plan(Part):
     notes: list[str]
 
 
-class ConversionPart(Part):
+class ConversionPart(DocumentPart):
     """A conversion with its certificate."""
 
     schema_: Literal["pidemu-conversion-1"] = Field(alias="schema", description="Name and version of this form.")

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from pidemu.files.documents import DocumentPart
 from pidemu.process.process import Process
 from pidemu.process.text import written
-
-Number = float | Literal["inf", "-inf", "nan"]
-"""JSON has no infinity: it is written as a word."""
-
-
-class DocumentPart(BaseModel):
-    """A part of the document; what it does not name is not in it."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
 
 class ProcessPart(DocumentPart):

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.process.hold import chain, expm1, outputs
 from pidemu.process.process import Process
 
-Floats = npt.NDArray[np.float64]
 _HALVINGS: Final = 200
 """Steps after which a crossing has been found in any case."""
 

@@ -11,14 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
 from pidemu.plausible import INTERVAL, LEVEL, plausible
 from pidemu.process.process import Process
 from pidemu.process.relay_loop import SCANS, Cycle, Relay, RelayLoop, scanned_cycle
 
-Floats = npt.NDArray[np.float64]
 _HYSTERESIS: Final = 3.0
 """Standard deviations of the noise that the hysteresis is, where it is not given."""
 

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
 from pidemu.process.hold import Plant
 from pidemu.process.motion import Motion
 from pidemu.process.process import Process
 
-Floats = npt.NDArray[np.float64]
 _PERIODS: Final = 200
 """Periods after which an oscillation that has not become even is none."""
 _EVEN: Final = 1e-9

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class Bumpless(Start):
+class BumplessStart(Start):
     """The first automatic output equals the last output, `I = u - P - D`."""
 
     word = "bumpless"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class Keep(Start):
+class KeepStart(Start):
     """The integral stands as it stood."""
 
     word = "keep"

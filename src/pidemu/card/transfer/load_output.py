@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class LoadOutput(Start):
+class LoadOutputStart(Start):
     """The integral sum is loaded with the last output and the terms come on top, a bump of `P + D`."""
 
     word = "load-output"

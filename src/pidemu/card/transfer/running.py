@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class Running(Start):
+class RunningStart(Start):
     """The algorithm runs on in manual, and only its output is not used."""
 
     word = "running"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class Tracked(Start):
+class TrackedStart(Start):
     """In manual the integral follows the output, and the first automatic scan moves on from there."""
 
     word = "tracked"

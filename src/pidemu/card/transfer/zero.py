@@ -5,7 +5,7 @@ from __future__ import annotations
 from pidemu.card.transfer.start import Start
 
 
-class Zero(Start):
+class ZeroStart(Start):
     """The integral starts at zero."""
 
     word = "zero"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pidemu.card.model.base import Flag, Given, R, Reference, means, short
 from pidemu.card.model.marks import Names
-from pidemu.card.windup.scheme import Numbers, Scheme
+from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
 from pidemu.units import Dimension, parse_unit
 
@@ -76,11 +76,11 @@ class WindupBackCalculation(Scheme[R]):
         if not ratio and self.times is not None:
             yield f"'{given}' is a time already; remove 'times'"
 
-    def with_numbers(self: WindupBackCalculation[Reference], read: Numbers[X]) -> Scheme[X]:
+    def with_numbers(self: WindupBackCalculation[Reference], read: NumberSource[X]) -> Scheme[X]:
         """Return the scheme of an algorithm, with the tracking time in seconds."""
         return WindupBackCalculation(scheme=self.scheme, tracking_time=self._seconds(read), implicit=self.implicit)
 
-    def _seconds(self: WindupBackCalculation[Reference], read: Numbers[X]) -> X:
+    def _seconds(self: WindupBackCalculation[Reference], read: NumberSource[X]) -> X:
         if not read.integrates:
             return read.pick(0.0, 0.0)
         given = self.tracking_time

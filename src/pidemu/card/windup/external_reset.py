@@ -11,7 +11,7 @@ from pydantic import Field
 
 from pidemu.card.model.base import Given, Part, R, Reference, Rule, means
 from pidemu.card.model.marks import Beyond, Names
-from pidemu.card.windup.scheme import Numbers, Scheme
+from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
 
 
@@ -75,7 +75,7 @@ class WindupExternalReset(Scheme[R]):
         beyond = f"while the output is above {named(f.high)} or below {named(f.low)}"
         return f"; {beyond} and the integral on its way back, the integral time is divided by {f.factor:g}"
 
-    def with_numbers(self: WindupExternalReset[Reference], read: Numbers[X]) -> Scheme[X]:
+    def with_numbers(self: WindupExternalReset[Reference], read: NumberSource[X]) -> Scheme[X]:
         """Return the scheme of an algorithm, with the limits of its fast return in percent; without where that does nothing."""
         f = self.fast_return
         if f is None or f.factor == 1 or not read.integrates:

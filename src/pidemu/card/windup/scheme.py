@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 N_co = TypeVar("N_co", bound=Real, covariant=True)
 
 
-class Numbers(Protocol[N_co]):
+class NumberSource(Protocol[N_co]):
     """What a scheme reads its numbers from, when a card is resolved with its settings."""
 
     @property
@@ -94,7 +94,7 @@ class Scheme(Part, Generic[R]):
         """Yield what is wrong by the scheme's own rules."""
         yield from ()
 
-    def with_numbers(self: Scheme[Reference], read: Numbers[X]) -> Scheme[X]:
+    def with_numbers(self: Scheme[Reference], read: NumberSource[X]) -> Scheme[X]:
         """Return the scheme of an algorithm: with numbers where the card names settings. Most have none."""
         return cast("Scheme[X]", self)
 

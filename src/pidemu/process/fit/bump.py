@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FitRefusedError, RecordError
 from pidemu.files.tables import counted
 from pidemu.plausible import SIGNAL, shown
 
-Floats = npt.NDArray[np.float64]
 _FEWEST: Final = 8
 """Samples below which nothing is fitted."""
 _PLACES: Final = 3

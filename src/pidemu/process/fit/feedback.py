@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pidemu.arrays import Floats
+
 _FEWEST: Final = 30
 """Moves of the output below which nothing can be told."""
 _MOST: Final = 5000

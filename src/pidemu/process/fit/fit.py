@@ -9,18 +9,18 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FitRefusedError, ProcessError, RecordError, suggest
 from pidemu.excerpt import quoted
 from pidemu.process.fit.bump import BumpTest, read_bump
 from pidemu.process.fit.feedback import CLOSED, feedback_share
 from pidemu.process.fit.goodness import Goodness, Interval, intervals, judge
-from pidemu.process.fit.least_squares import Search
+from pidemu.process.fit.least_squares import LeastSquaresSearch
 from pidemu.process.fit.optimum import Optimum
 from pidemu.process.fit.reaction_curve import read_curve, read_slopes
 from pidemu.process.process import Process
 from pidemu.process.text import PERCENT
 
-Floats = npt.NDArray[np.float64]
 Model = Literal["fopdt", "sopdt", "ipdt"]
 Method = Literal["least-squares", "tangent", "two-point"]
 MODELS: Final[tuple[Model, ...]] = get_args(Model)
@@ -176,7 +176,7 @@ def fit_process(
         raise FitRefusedError(closed)
     drifts = _drifts(test) if drift is None else drift
     reader = _READERS.get((model, method))
-    found = Search(test, _LAGS[model], drifts).optimum() if reader is None else reader(test)
+    found = LeastSquaresSearch(test, _LAGS[model], drifts).optimum() if reader is None else reader(test)
     goodness = judge(test, found)
     _check_answer(test, found, goodness, closed, fitted=reader is None)
     sure = {} if reader else intervals(test, found, goodness)

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.process.fit.bump import BumpTest
 from pidemu.process.fit.optimum import Optimum
 from pidemu.process.fit.responses import HeldOutput
 
-Floats = npt.NDArray[np.float64]
 Interval = tuple[float, float]
 CONFIDENCE: Final = 0.95
 _NORMAL: Final = 1.959963984540054

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.process.fit.bump import BumpTest
 from pidemu.process.fit.minimise import dot, least_squares
 from pidemu.process.fit.optimum import Optimum
 from pidemu.process.fit.responses import HeldOutput
 
-Floats = npt.NDArray[np.float64]
 _SPANS: Final = 24
 """Sums of lags and dead time that are tried first."""
 _SHARES: Final = (0.02, 0.25, 0.5, 0.75, 0.95)
@@ -44,7 +44,7 @@ _ENOUGH: Final = 2000
 """Samples from which the search starts, evenly over the record, and as many after its first moves."""
 
 
-class Search:
+class LeastSquaresSearch:
     """The sum of squares of a record under a model of so many lags, as a function of lags and dead time alone.
 
     Parameters
@@ -71,7 +71,7 @@ class Search:
 
     def optimum(self) -> Optimum:
         """Return the best model."""
-        few = self if self._time.size <= 2 * _ENOUGH else Search(self._test, self.order, self.drifts, _some(self._test))
+        few = self if self._time.size <= 2 * _ENOUGH else LeastSquaresSearch(self._test, self.order, self.drifts, _some(self._test))
         _, start = min((few._follow(x, 0.0, self._test.duration) for x in few._starts()), key=lambda x: x[0])
         best = self._follow(start, 0.0, self._test.duration)
         for low, high in self._pieces(float(best[1][-1])):

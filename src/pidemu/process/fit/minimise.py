@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pidemu.arrays import Floats
+
 _STEP: Final = 1e-7
 """Step of the differences, in the scale of a number."""
 _MOST: Final = 60

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.arrays import Floats
 from pidemu.errors import FitRefusedError
 from pidemu.process.fit.bump import BumpTest, name_moves
 from pidemu.process.fit.optimum import Optimum
 
-Floats = npt.NDArray[np.float64]
 _POINT: Final = 0.632
 _AT_REST: Final = 0.1
 """Share of the time after the step over which the end of the curve is averaged."""

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from pidemu.arrays import Floats
+
 _ALIKE: Final = 1e-6
 """Difference of two rates times a time below which they count as equal, by a series."""
 
