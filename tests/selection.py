@@ -22,12 +22,14 @@ SLOW: Final = (
     "conversion/test_wrong_rules.py",
     "cutover/test_bench_check.py", "cutover/test_every_card.py", "fleet", "simulation/test_closed.py",
     "simulation/test_figures.py", "simulation/test_simulation.py", "matrix", "real/test_advanced_pid.py", "real/test_king.py",
-    "real/test_limpid.py", "real/test_listing.py", "real/test_pid2.py", "records", "report", "program/test_programs.py",
+    "real/test_limpid.py", "real/test_listing.py", "real/test_pid2.py", "records", "report",
+    "program/test_made_up_scheme.py", "program/test_programs.py",
     "program/test_rules.py", "program/test_windup_schemes.py", "backends", "tools/test_fuzz.py", "tools/test_harness.py",
     "tools/test_matrix_docs.py", "test_any_numbers.py", "test_changes.py", "test_docs.py", "test_docs_certificate.py",
     "test_docs_fleet.py", "test_doctests.py", "controller/test_controller.py", "backends/test_choice.py",
     "controller/test_faults.py", "law/test_law.py", "controller/test_modes.py", "test_packaging.py", "report/test_plots.py",
-    "law/test_power_series.py", "settings/test_settings.py", "controller/test_transfers.py", "test_worked_examples.py",
+    "law/test_power_series.py", "settings/test_settings.py", "controller/test_transfers.py", "test_types.py",
+    "test_worked_examples.py",
 )  # fmt: skip
 """Files of more than about three seconds, and folders of which no file is fast."""
 

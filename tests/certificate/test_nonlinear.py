@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pidemu.card.model.around import STARTS
 
 import pidemu
+from pidemu.card.transfer import STARTS
 from pidemu.certificate import limit_test as windup
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.nonlinear import nonlinear_differences
@@ -208,7 +208,8 @@ def test_loading_the_output_bumps_by_the_other_terms() -> None:
     error = -size / 2  # the measurement is that much above the setpoint
     assert found.figures[TO_AUTO] == pytest.approx((0.0, K * error + ki * 1.0 * error), abs=1e-9)
     assert found.figures[TO_MANUAL] == (0.0, 0.0)
-    assert f"generic/parallel {STARTS['bumpless']}, arduino/pid {STARTS['load-output']}" in found.text
+    said = f"generic/parallel {STARTS['bumpless'].of_a_controller}, arduino/pid {STARTS['load-output'].of_a_controller}"
+    assert said in found.text
     assert "with PV 2 % above SP, the output jumps by 0 % on the old controller and -4.04 % on the new one" in found.text
 
 
@@ -224,7 +225,7 @@ def test_an_integral_that_runs_on_in_manual_makes_the_output_jump() -> None:
     found = differences(settings("generic/standard", K=K, Ti=Ti), settings("oscat/ft-pid", KP=K, TN=Ti, TV=0))["transfer"]
     computed = 50 + K * e + K * e * (3 * T + 1) / Ti  # from 50 at rest, with the error of the manual spell and one scan more
     assert found.figures[TO_AUTO][1] == pytest.approx(computed - 40, abs=0.02)  # half a scan, as the rule is the trapezoidal one
-    assert STARTS["running"] in found.text
+    assert STARTS["running"].of_a_controller in found.text
 
 
 @pytest.mark.parametrize(
@@ -284,7 +285,7 @@ def test_a_controller_that_cannot_be_emulated_leaves_the_words_and_says_why() ->
     assert "the forward rule is unstable" in found["windup"].text
     assert found["windup"].text.endswith("mathworks/pid2: none: the integral goes on.")
     assert found["windup"].figures == {}
-    assert STARTS["running"] in found["transfer"].text
+    assert STARTS["running"].of_a_controller in found["transfer"].text
     assert found["transfer"].figures == {}
     assert "limits" in found
 
