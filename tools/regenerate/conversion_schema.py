@@ -16,19 +16,20 @@ from pidemu.certificate.models import Certificate
 from pidemu.certificate.proof import Proof
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.questions import Kind
-from pidemu.conversion.schema import ConversionPart, Dial, Name, Part, Side
+from pidemu.conversion.schema import ConversionPart, Dial, Name, Side
+from pidemu.files.documents import DocumentPart
 
 _CERTIFICATE: Final = "Certificate"
 _LINES: Final = {"type": "array", "items": {"type": "string"}}
 
 
-class Card(Part):
+class Card(DocumentPart):
     """A target of which nothing but the card is known."""
 
     card: Name
 
 
-class Reading(Part):
+class Reading(DocumentPart):
     """One way to answer a question."""
 
     value: str
@@ -40,7 +41,7 @@ class Reading(Part):
     alike: list[str]
 
 
-class QuestionPart(Part):
+class QuestionPart(DocumentPart):
     """Something that only the user can know, and that changes the result."""
 
     kind: Kind
@@ -49,7 +50,7 @@ class QuestionPart(Part):
     readings: Annotated[list[Reading], Field(max_length=6)]
 
 
-class QuestionsPart(Part):
+class QuestionsPart(DocumentPart):
     """Questions that have to be answered first."""
 
     schema_: Literal["pidemu-conversion-1"] = Field(alias="schema")
@@ -59,7 +60,7 @@ class QuestionsPart(Part):
     questions: Annotated[list[QuestionPart], Field(min_length=1)]
 
 
-class RefusalPart(Part):
+class RefusalPart(DocumentPart):
     """Why the target cannot do what the source does."""
 
     schema_: Literal["pidemu-conversion-1"] = Field(alias="schema")

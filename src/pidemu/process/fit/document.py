@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from pidemu.files.documents import DocumentPart, Number
 from pidemu.formatting import json_safe
-from pidemu.process.document import DocumentPart, Number, ProcessPart, plain_process
+from pidemu.process.document import ProcessPart, plain_process
 from pidemu.process.fit.goodness import CONFIDENCE
 
 if TYPE_CHECKING:
