@@ -352,9 +352,6 @@ NOT_COMPARED: dict[tuple[str, ...], str] = {
     ("date",): "when it was made is not computed",
     ("worst_at",): "where a largest value lies jumps between equal ones; verify says that it does not look",
     ("largest_at",): "the same",
-    ("request", "tag"): "it is what was asked; but the command is another one then",
-    ("request", "allow_approximate"): "the same",
-    ("transfer_plan", "at", 0): "what was asked, with the same plan where only the error counts",
 }
 """What may be edited without a change being found, and why."""
 
