@@ -12,6 +12,7 @@ import pidemu
 from tests.cli.helpers import said, strict_json, told, with_another_filter
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--tag", "TIC-101", "--date", "2026-07-01")
+NOT_COMPARED = "not compared:\n  - its date, and where in a band a largest value lies (worst_at, largest_at)\n"
 HEAD = f"TIC-101: fisher/provox -> emerson/deltav, certificate of 2026-07-01 by pidemu {pidemu.__version__}\n"
 
 
@@ -26,7 +27,9 @@ def certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_an_unchanged_certificate_exits_with_0(certificate: Path) -> None:
     assert said("verify", "TIC-101.json") == (
         0,
-        HEAD + "unchanged: dials, options, verdict, conditions, action, bench check and figures are those of the certificate\n",
+        HEAD
+        + "unchanged: dials, options, verdict, conditions, action, bench check and figures are those of the certificate\n"
+        + NOT_COMPARED,
         "",
     )
 
@@ -41,7 +44,9 @@ def test_a_changed_one_exits_with_1_and_says_what_and_by_which_version(certifica
     assert out.startswith(f"{HEAD}changed:\n  - dial RATE: 5.25 s on the certificate, 5.4 s now\n")
     assert "  - condition: PROVOX's derivative filter is RATE/8 (assumed) on the certificate, " in out
     before, now = (pidemu.load_card(x).digest[:12] for x in ("fisher/provox", own / "provox.yaml"))
-    assert out.endswith(f"because:\n  - fisher/provox is another version: {before} on the certificate, {now} now\n")
+    because, _, rest = out.partition("not compared:\n")
+    assert because.endswith(f"because:\n  - fisher/provox is another version: {before} on the certificate, {now} now\n")
+    assert "wording, assumptions" in rest
 
 
 def test_many_changed_figures_are_counted_not_listed(certificate: Path) -> None:
@@ -51,7 +56,8 @@ def test_many_changed_figures_are_counted_not_listed(certificate: Path) -> None:
     changes = strict_json(said("verify", "TIC-101.json", "--json").out)["changes"]
     assert status == 1
     assert len(changes) > 8
-    assert {c["kind"] for c in changes} == {"figure"}
+    assert {c["kind"] for c in changes} == {"figure", "textbook rule"}
+    changes = [c for c in changes if c["kind"] == "figure"]
     assert out.count("  - figure ") == 8
     assert f"    and {len(changes) - 8} more of kind 'figure' (--json lists all)\n" in out
 
@@ -76,6 +82,7 @@ def test_json_says_the_same(certificate: Path) -> None:
         "unchanged": True,
         "changes": [],
         "because": [],
+        "not_compared": ["its date, and where in a band a largest value lies (worst_at, largest_at)"],
         "date": "2026-07-01",
         "pidemu": {"certificate": pidemu.__version__, "now": pidemu.__version__},
         "cards": {card: {"certificate": digest, "now": digest} for card, digest in digests.items()},

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date
 from functools import cache
 from pathlib import Path
@@ -16,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.conversion.changes import DIAL, FIGURE
+from pidemu.conversion import comparison, verify
 from pidemu.errors import CertificateError, PidemuError
 from tests.cli.helpers import said, strict_json, with_another_filter
 from tests.conversion.commands import CONVERSIONS, OTHERS
@@ -295,7 +296,7 @@ def test_a_wrong_value_is_named_with_its_place(path: tuple[str, ...]) -> None:
 def test_a_card_that_is_a_file_is_not_read() -> None:
     plain = signed()
     plain["request"]["to"] = "/etc/passwd.yaml"
-    plain["cards"]["/etc/passwd.yaml"] = "0" * 64
+    plain["cards"]["/etc/passwd.yaml"] = plain["cards"].pop("emerson/deltav")
     with pytest.raises(CertificateError, match=r"^certificate: request.to: '/etc/passwd.yaml' is a file, not the id of a card"):
         pidemu.verify(plain)
 
@@ -306,6 +307,13 @@ def paths(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield path
     for key, item in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
         yield from paths(item, (*path, key))
+
+
+def at(value: Any, path: tuple[Any, ...]) -> Any:
+    """Return what stands at a place."""
+    for step in path:
+        value = value[step]
+    return value
 
 
 PLACES = list(paths(signed()))
@@ -340,8 +348,105 @@ def test_no_file_makes_a_traceback(places: list[tuple[Any, ...]], values: list[A
     assert all(str(c) for c in found.changes)
 
 
+NOT_COMPARED: dict[tuple[str, ...], str] = {
+    ("date",): "when it was made is not computed",
+    ("worst_at",): "where a largest value lies jumps between equal ones; verify says that it does not look",
+    ("largest_at",): "the same",
+}
+"""What may be edited without a change being found, and why."""
+
+
+def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the place of every number, word, truth and null."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    if items is None:
+        yield path
+    else:
+        for key, item in items:
+            yield from leaves(item, (*path, key))
+
+
+def edited(value: Any) -> Any:
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int | float):
+        return 2 * value + 1
+    return "edited" if value is None else f"{value} edited" if value else "edited"
+
+
+def without_objection(plain: Any, paths: list[tuple[Any, ...]], change: Callable[[Any, Any], None]) -> set[tuple[Any, ...]]:
+    """Return where `verify` takes a change for nothing."""
+    found = set()
+    for path in paths:
+        place = changed = copy.deepcopy(plain)
+        for step in path[:-1]:
+            place = place[step]
+        change(place, path[-1])
+        with contextlib.suppress(CertificateError):
+            verified = pidemu.verify(changed)
+            if verified.unchanged and not verified.versions:
+                found.add(path)
+    return found
+
+
+@pytest.fixture
+def once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute each conversion that is asked for once."""
+    known: dict[str, Any] = {}
+
+    def again(*asked: Any) -> Any:
+        key = repr(asked[0].request)
+        if key not in known:
+            known[key] = real(*asked)
+            plain = known[key].to_dict()
+            object.__setattr__(known[key], "to_dict", lambda: plain)
+        return known[key]
+
+    real = verify._again
+    monkeypatch.setattr(verify, "_again", again)
+
+
+@pytest.mark.usefixtures("once")
+@pytest.mark.parametrize("name", ["all figures", "nearest settings", "ranges"])
+def test_no_leaf_of_a_certificate_can_be_edited_unseen(name: str) -> None:
+    plain = signed(*CONVERSIONS[name])
+
+    def edit(place: Any, key: Any) -> None:
+        place[key] = edited(place[key])
+
+    unseen = without_objection(plain, list(leaves(plain)), edit)
+    assert {path for path in unseen if path not in NOT_COMPARED and path[-1:] not in NOT_COMPARED} == set()
+
+
+@pytest.mark.usefixtures("once")
+def test_no_key_of_a_certificate_can_be_taken_out_or_put_in_unseen() -> None:
+    plain = signed(*CONVERSIONS["all figures"])
+    groups = [p for p in [(), *paths(plain)] if isinstance(at(plain, p), dict)]
+    keys = [(*p, key) for p in groups for key, value in at(plain, p).items() if value is not None]
+    assert without_objection(plain, keys, lambda place, key: place.pop(key)) == {("transfer_plan",)}  # as without --cut-over
+    assert without_objection(plain, [(*p, "more") for p in groups], lambda place, key: place.update({key: 1.0})) == set()
+
+
+def test_what_verify_does_not_look_at_is_said() -> None:
+    found = pidemu.verify(signed())
+    assert found.not_compared == ("its date, and where in a band a largest value lies (worst_at, largest_at)",)
+    assert len(pidemu.verify(signed() | {"pidemu": "0.0.1"}).not_compared) == 2
+
+
+def test_a_key_that_is_not_known_is_refused_wherever_it_stands() -> None:
+    for path in ((), ("request",), ("to",), ("to", "settings", "GAIN"), ("textbook",)):
+        plain = signed()
+        at(plain, path)["more"] = 1
+        with pytest.raises(CertificateError, match=rf"^certificate: {'.'.join([*path, 'more'])}: an unknown key"):
+            pidemu.verify(plain)
+    plain = signed()
+    plain["cards"]["generic/series"] = "0" * 64
+    with pytest.raises(CertificateError, match=r"^certificate: cards: 'generic/series' has no part in this conversion"):
+        pidemu.verify(plain)
+
+
 def test_tolerances_are_those_that_the_command_states() -> None:
-    assert (DIAL, FIGURE) == (1e-6, 1e-4)
+    assert (comparison.DIAL, comparison.FIGURE) == (1e-6, 1e-4)
     text = " ".join(said("verify", "--help").out.split())
     assert "dials (to 1e-6)" in text
     assert "figures (to 1e-4" in text

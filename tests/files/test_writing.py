@@ -6,7 +6,7 @@ import os
 import stat
 import subprocess
 import sys
-import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,8 @@ from pidemu.errors import FleetError, RecordError
 from pidemu.files.writing import beside, check
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="modes, links and devices as POSIX has them")
+
+LOOP = ("generic/standard", "K=1", "Ti=10", "--process", "gain=1,lag=10")
 
 
 def write(path: Path | str, text: str, *inputs: Path) -> None:
@@ -148,15 +150,66 @@ def test_of_a_link_the_target_is_replaced_be_it_there_or_not(tmp_path: Path) -> 
 
 @POSIX
 def test_what_is_not_a_file_is_written_straight(tmp_path: Path) -> None:
-    fifo, found = tmp_path / "fifo", []
+    fifo = tmp_path / "fifo"
     os.mkfifo(fifo)
-    reader = threading.Thread(target=lambda: found.append(fifo.read_text()))
-    reader.start()
+    reader = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
     write(fifo, "text")
-    reader.join(10)
-    assert found == ["text"]
+    assert os.read(reader, 100) == b"text"
+    os.close(reader)
     assert names(tmp_path) == ["fifo"]
     write("/dev/null", "text")
+
+
+@POSIX
+def test_a_pipe_that_nobody_reads_is_not_waited_for(tmp_path: Path) -> None:
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    assert message(fifo) == (
+        f"{fifo}: cannot be written: nothing reads this pipe; start the reader first, such as 'cat {fifo} > FILE &', or give a file"
+    )
+
+
+@POSIX
+def test_looking_at_a_pipe_before_the_work_does_not_end_its_reader(tmp_path: Path) -> None:
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    with subprocess.Popen(["cat", fifo], stdout=subprocess.PIPE, text=True) as reader:
+        for _ in range(100):  # until it has begun
+            try:
+                check(fifo, RecordError)
+                break
+            except RecordError:
+                time.sleep(0.1)
+        check(fifo, RecordError)
+        write(fifo, "text")
+        assert reader.communicate(timeout=60)[0] == "text"
+
+
+@POSIX
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("simulate", *LOOP, "--scan", "1", "--out", "pipe"),
+        ("run", *LOOP[:3], "--record", "r.csv", "--scan", "1", "-o", "pipe"),
+        ("compare", *LOOP[:3], *LOOP[:3], "--record", "r.csv", "--scan", "1", "-o", "pipe"),
+        ("fleet", "loops.csv", "--table", "pipe"),
+        ("fleet", "loops.csv", "--parquet", "pipe"),
+        ("fleet", "loops.csv", "--parquet", "pipe", "--resume"),
+        ("matrix", "--csv", "pipe"),
+        ("convert", *LOOP[:3], "--to", "fisher/provox", "--html", "pipe"),
+        ("code", *LOOP[:3], "--scan", "1", "--out", ".", "--name", "pipe"),
+    ],
+    ids=" ".join,
+)
+def test_no_command_waits_for_somebody_who_reads(words: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("sp,pv\n1,2\n2,3\n")
+    (tmp_path / "loops.csv").write_text('tag,card,settings,process\nA,generic/standard,K=1;Ti=10,"gain=1,lag=10"\n')
+    os.mkfifo(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "pipe.py")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
+    command = [sys.executable, "-m", "pidemu", *words]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, "nothing reads this pipe; start the reader first" in done.stderr) == (2, True)
 
 
 @POSIX

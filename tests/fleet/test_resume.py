@@ -18,6 +18,7 @@ import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
 from pidemu.backends.cache import warn
 from pidemu.fleet import finished, local
+from pidemu.fleet.blocks import run_block
 from pidemu.fleet.finished import keys
 from pidemu.fleet.folder import INDEX
 from pidemu.fleet.loops import FleetPlan
@@ -105,6 +106,34 @@ def test_what_is_complete_is_taken_and_the_rest_is_run(
     again = Fleet(loops()).simulate(**STEPS, folder=folder, parquet=parquet, resume=True)
     assert ran == ["fails"]  # which costs nothing, and may be mended by now
     check(again, expected, signals=folder is not None)
+
+
+@pytest.mark.parametrize(("engine", "narrowest", "widths"), [("python", {}, [5, 5, 5, 5, 1]), ("numpy", {"numpy": 9}, [9, 9, 3])])
+def test_a_fleet_of_one_structure_is_complete_block_by_block(
+    engine: Any, narrowest: dict[str, int], widths: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """121 scans each: five loops are 605 scans, and what is not written has no such bound."""
+    monkeypatch.setattr(local, "_WORK", 610)
+    monkeypatch.setattr(local, "_NARROWEST", narrowest)
+    some = alike(21)
+    kept = Fleet(some).simulate(**STEPS, folder=tmp_path, engine=engine, cores=1)
+    assert [np.load(path, mmap_mode="r").shape for path in sorted(tmp_path.glob("*.npy"))] == [(2, 121, n) for n in widths]
+    blocks: list[int] = []
+
+    def counted(part: Any, *rest: Any) -> Any:
+        blocks.append(len(part))
+        return run_block(part, *rest)
+
+    monkeypatch.setattr(local, "run_block", counted)
+    check(Fleet(some).simulate(**STEPS, engine=engine), kept, signals=False)
+    assert blocks == [21]
+
+
+def test_the_first_loops_that_are_kept_run_before_the_last_are_prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "_AT_ONCE_KEPT", 4)
+    some = alike(9)
+    Fleet(some).simulate(**STEPS, folder=tmp_path, engine="numpy")
+    assert [np.load(path, mmap_mode="r").shape[2] for path in sorted(tmp_path.glob("*.npy"))] == [4, 4, 1]
 
 
 def test_signals_are_complete_where_they_are_in_the_folder_and_in_the_parquet_file(

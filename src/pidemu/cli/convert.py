@@ -221,7 +221,7 @@ def command(
 
         write_page(page, conversion, plan, date=date)
     if as_json:
-        print_json({**conversion.to_dict(date), **({} if plan is None else {"transfer_plan": plan.to_dict()})})
+        print_json({**conversion.to_dict(date), **_plain_plan(plan, now)})
     else:
         _print(conversion, plan, explain=explain, page=page)
     if not_known is not None:
@@ -263,6 +263,11 @@ def _plan(conversion: Conversion, now: str | None) -> tuple[TransferPlan | None,
         return conversion.transfer_plan(*_signals(now)), None
     except ActionError as error:
         return None, error
+
+
+def _plain_plan(plan: TransferPlan | None, now: str | None) -> dict[str, Any]:
+    """Return the cut-over plan as plain values, with the signals that it is for."""
+    return {} if plan is None or now is None else {"transfer_plan": {"at": list(_signals(now)), **plan.to_dict()}}
 
 
 def _only_reading(

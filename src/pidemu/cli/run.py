@@ -34,7 +34,7 @@ from pidemu.excerpt import printable
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.formatting import json_safe
-from pidemu.plausible import plain_number
+from pidemu.plausible import LEVEL, plain_number, plausible
 from pidemu.program.ir import StateRole
 from pidemu.records.files import Record, read_record, write_record
 from pidemu.records.playback import Playback, Timing, far_out, play, timing
@@ -176,9 +176,7 @@ def _number(name: str, text: str) -> float:
         value = plain_number(text.strip(), words=True)
     except ValueError:
         raise SettingError(f"--initial {name}: '{text}' is not a number") from None
-    if not np.isfinite(value):
-        raise SettingError(f"--initial {name}: '{text}' is not a finite number")
-    return value
+    return plausible(f"--initial {name}", value, LEVEL, SettingError)
 
 
 def _plain(controller: Controller, record: Record, playback: Playback) -> dict[str, Any]:

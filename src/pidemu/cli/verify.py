@@ -18,8 +18,9 @@ _SHOWN = 8
 def command(certificate: str, vendors: tuple[str, ...], as_json: bool) -> None:
     """Compute the certificate that ``pidemu convert --json`` wrote again, and say what changed.
 
-    It holds all that was asked, and the version of each card. Compared are dials (to 1e-6), options, verdict, conditions, action,
-    bench check and figures (to 1e-4: what computing on another machine may move). Exit status 0 if they are unchanged, 1 if not.
+    It holds all that was asked, and the version of each card. Everything else in it is computed and compared: dials (to 1e-6),
+    figures (to 1e-4: what computing on another machine may move), options, verdict, conditions and the rest. What is not compared
+    is named. Exit status 0 if all is unchanged, 1 if not.
     """
     found = verify(certificate, vendors)
     if as_json:
@@ -35,6 +36,7 @@ def _print(v: Verification) -> None:
         wrapped("unchanged: dials, options, verdict, conditions, action, bench check and figures are those of the certificate", "")
         for text in v.versions:
             wrapped(f"though {text}", "  - ")
+        _print_not_compared(v)
         return
     echo("changed:")
     shown = {kind: [c for c in v.changes if c.kind == kind] for kind in dict.fromkeys(c.kind for c in v.changes)}
@@ -45,4 +47,11 @@ def _print(v: Verification) -> None:
             echo(f"    and {len(changes) - _SHOWN} more of kind '{kind}' (--json lists all)")
     echo("because:")
     for text in v.because:
+        wrapped(text, "  - ")
+    _print_not_compared(v)
+
+
+def _print_not_compared(v: Verification) -> None:
+    echo("not compared:")
+    for text in v.not_compared:
         wrapped(text, "  - ")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import isfinite, isinf, isnan, nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -35,7 +35,12 @@ def _pair(limits: Sequence[float]) -> tuple[float, float]:
         low, high = (number(x) for x in limits)
     except (TypeError, ValueError):
         raise ScanError(f"output limits {shown(limits)} are not a pair of numbers such as (0, 100)") from None
-    return low, high
+    return _limit(low), _limit(high)
+
+
+def _limit(x: float) -> float:
+    """Return an output limit; an infinite one is none."""
+    return x if isinf(x) else plausible("output limit", x, LEVEL, ScanError)
 
 
 def _number(name: str, given: object) -> float:

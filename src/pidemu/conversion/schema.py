@@ -171,6 +171,9 @@ class PlanStep(DocumentPart):
 class Plan(DocumentPart):
     """How to change over without a bump."""
 
+    at: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
+        description="Setpoint, measurement and output at the cut-over, as the old controller shows them."
+    )
     steps: list[PlanStep]
     bump: Number
     without_plan: Number

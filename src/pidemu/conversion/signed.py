@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from pydantic import ConfigDict, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 import pidemu
@@ -26,11 +26,14 @@ _KIND: Final = Kind("a certificate", _AGAIN, LARGEST)
 
 
 class Signed(ConversionPart):
-    """A whole certificate; keys that a later pidemu adds are left alone."""
-
-    model_config = ConfigDict(extra="ignore", strict=True, frozen=True, defer_build=True)
+    """A whole certificate; a key that this pidemu does not know is refused, wherever it stands, as it could not be verified."""
 
     certificate: dict[str, Any]
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """The certificate as plain values, as the file has it."""
+        return self.model_dump(by_alias=True, exclude_unset=True)
 
 
 def read_signed(source: str | Path | Mapping[str, Any]) -> tuple[str, Signed]:
@@ -105,6 +108,9 @@ def _checked(name: str, plain: Any) -> Signed:
     for card in (signed.request.source.card, signed.request.to):
         if card not in signed.cards:
             raise CertificateError(f"{name}: cards: the version of {card} is missing; {_AGAIN}")
+    for card in signed.cards:
+        if card not in (signed.request.source.card, signed.request.to):
+            raise CertificateError(f"{name}: cards: '{quoted(card)}' has no part in this conversion; {_AGAIN}")
     return signed
 
 
@@ -122,7 +128,7 @@ def _fault(error: ErrorDetails, plain: Any) -> str:
         return f"{'.'.join([*path, quoted(error['loc'][-1])])}: missing"
     place = ".".join(path)
     if error["type"] == "extra_forbidden":
-        return f"{place}: an unknown key"
+        return f"{place}: an unknown key"  # of a later pidemu, or of nobody: it could not be verified
     message = error["msg"].removeprefix("Input ")
     return f"{place}: {message[0].lower()}{message[1:]}, and is {_shown(value)}"
 

@@ -12,7 +12,8 @@ import numpy as np
 import pidemu
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.conversion.changes import Change, changes_from
+from pidemu.conversion.changes import changes, not_compared
+from pidemu.conversion.comparison import Change
 from pidemu.conversion.convert import convert
 from pidemu.conversion.document import card_versions
 from pidemu.conversion.refused import ConversionRefusedError, QuestionError
@@ -51,8 +52,13 @@ class Verification:
 
     @property
     def unchanged(self) -> bool:
-        """Whether settings, verdict, conditions and figures are still those of the certificate."""
+        """Whether everything is still as the certificate says, but for what is `not_compared`."""
         return not self.changes
+
+    @property
+    def not_compared(self) -> tuple[str, ...]:
+        """What of the certificate is not held against anything."""
+        return not_compared(self.signed, self.cards)
 
     @property
     def title(self) -> str:
@@ -90,6 +96,7 @@ class Verification:
             "unchanged": self.unchanged,
             "changes": [asdict(c) for c in self.changes],
             "because": list(self.because),
+            "not_compared": list(self.not_compared),
             "date": s.date,
             "pidemu": {"certificate": s.pidemu, "now": pidemu.__version__},
             "cards": {card: {"certificate": s.cards[card], "now": digest} for card, digest in self.cards.items()},
@@ -109,8 +116,8 @@ def verify(certificate: str | Path | Mapping[str, Any], vendors: Sequence[str | 
     Returns
     -------
     Verification
-        Whether dials, options, verdict, conditions and figures are unchanged, and otherwise what changed and which card or pidemu
-        has another version. Dials are compared to 1e-6, figures to 1e-4 of their size: what computing on another machine may move.
+        Whether everything is unchanged, and otherwise what changed and which card or pidemu has another version. Dials are compared
+        to 1e-6, figures to 1e-4 of their size: what computing on another machine may move. What is not compared is named.
 
     Raises
     ------
@@ -136,7 +143,7 @@ def verify(certificate: str | Path | Mapping[str, Any], vendors: Sequence[str | 
             found = _again(signed, source, target)
         except PidemuError as error:
             return Verification(name, signed, None, (Change("conversion", "", signed.verdict, _outcome(error)),), versions)
-        return Verification(name, signed, found, tuple(changes_from(signed, found)), versions | card_versions(found))
+        return Verification(name, signed, found, tuple(changes(signed, found)), versions | card_versions(found))
 
 
 def _cards(signed: Signed) -> tuple[tuple[str, str], tuple[str, str]]:

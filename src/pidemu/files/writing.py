@@ -21,6 +21,9 @@ _FULL: Final = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFB
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 UNFINISHED: Final = ".unfinished"
 """Ending of a file that is being written beside another."""
+_NO_READER: Final = "nothing reads this pipe; start the reader first, such as 'cat {} > FILE &', or give a file"
+_PIPES: Final[dict[tuple[int, int], int]] = {}
+"""Pipes that were looked at, open since then: to its reader, one that is closed again has ended."""
 
 
 @overload
@@ -79,8 +82,15 @@ def check(path: str | Path, error: type[PidemuError], inputs: Iterable[str | Pat
     with _told(name, error):
         target = _target(path, name, error, tuple(inputs))
         if target is not None:
-            _, unfinished = _unfinished(target)
+            number, unfinished = _unfinished(target)
+            os.close(number)
             unfinished.unlink()
+            return
+        found = os.stat(path)
+        if stat.S_ISFIFO(found.st_mode) and _standard(found) is None:
+            number = _pipe(path)
+            _close(found)
+            _PIPES[found.st_dev, found.st_ino] = number
 
 
 def is_replaced(path: str | Path) -> bool:
@@ -127,6 +137,8 @@ def _told(name: str, error: type[PidemuError]) -> Iterator[None]:
     except BrokenPipeError:  # who reads has had enough, which is no fault
         raise
     except OSError as fault:
+        if fault.errno == errno.ENXIO:
+            raise error(f"{name}: cannot be written: {_NO_READER.format(name)}") from None
         _fail(name, error, fault)
 
 
@@ -174,13 +186,31 @@ def _standard(found: os.stat_result) -> int | None:
 
 def _straight(path: str | Path) -> int:
     """Open what is not replaced; a standard stream goes on where it is."""
-    standard = _standard(os.stat(path))
+    found = os.stat(path)
+    standard = _standard(found)
     if standard is None:
-        return os.open(path, os.O_WRONLY | getattr(os, "O_BINARY", 0))
+        if not stat.S_ISFIFO(found.st_mode):
+            return os.open(path, os.O_WRONLY | getattr(os, "O_BINARY", 0))
+        number = _PIPES.pop((found.st_dev, found.st_ino), None)
+        return _pipe(path) if number is None else number
     stream = sys.stdout if standard == 1 else sys.stderr
     if stream is not None:
         stream.flush()
     return os.dup(standard)
+
+
+def _pipe(path: str | Path) -> int:
+    """Open a pipe that somebody reads; where nobody does, there is an `OSError` at once, and no waiting for one."""
+    number = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    os.set_blocking(number, True)
+    return number
+
+
+def _close(found: os.stat_result) -> None:
+    """Close a pipe that was looked at before."""
+    number = _PIPES.pop((found.st_dev, found.st_ino), None)
+    if number is not None:
+        os.close(number)
 
 
 def _unfinished(target: Path) -> tuple[int, Path]:

@@ -25,6 +25,12 @@ _SIDE_BY_SIDE: Final = ("numpy", "numba")
 _TURN: Final = threading.Lock()
 _AT_ONCE: Final = 8192
 """Loops that are prepared, and then run, at a time: what is in memory does not grow with the fleet."""
+_AT_ONCE_KEPT: Final = 2048
+"""The same where signals are kept: preparing them takes 2 to 10 s, and until it is over nothing is complete."""
+_WORK: Final = 2**22
+"""Loops times scans of a block whose signals are kept: some 3 s in plain Python. A run that is killed loses them."""
+_NARROWEST: Final = {"numpy": 1024, "numba": 64}
+"""Loops below which a block is not made narrower: half as wide, these engines take longer for the same (1.6 and 2 times)."""
 _SLICE: Final = 128
 """Loops that are prepared from one look at what is done to the next."""
 _LOOK: Final = 0.5
@@ -58,7 +64,7 @@ def outcomes(
     threads = _Threads(count, plan, room)
     try:
         source = iter(loops)
-        while some := list(itertools.islice(source, _AT_ONCE)):
+        while some := list(itertools.islice(source, _AT_ONCE if room is None else _AT_ONCE_KEPT)):
             ready: list[Prepared] = []
             shared: dict[Structure, Structure] = {}
             for start in range(0, len(some), _SLICE):
@@ -92,7 +98,8 @@ class _Threads:
         choice, function, width = self._engine(group)
         if choice.engine in _ONE_AT_A_TIME:
             function = _in_turn(function)
-        for part in group.parts(width, 2 if choice.engine in _SIDE_BY_SIDE else 1):
+        widest = width if self._room is None else min(width, max(_NARROWEST.get(choice.engine, 1), _WORK // group.scans))
+        for part in group.parts(widest, 2 if choice.engine in _SIDE_BY_SIDE else 1):
             lanes = width if choice.engine == "numba" else len(part)
             self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
             self._left += 1

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pidemu.errors import FleetError
+from pidemu.files.reading import is_file
 from pidemu.files.writing import UNFINISHED, beside, check
 from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.finished import FIELDS, Finished, read_row
@@ -114,6 +115,8 @@ class ParquetFile:
 
     def _rows(self, path: Path) -> list[Finished]:
         """Return the loops of a file, all of which is read: that its numbers are what was written is seen then only."""
+        if not is_file(path):  # a pipe would be waited for
+            return []
         with self._pq.ParquetFile(path, page_checksum_verification=True) as file:
             if not file.schema_arrow.equals(self._schema):
                 return []
