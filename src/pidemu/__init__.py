@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pidemu.analysis.robustness import Robustness, robustness
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
     from pidemu.controller.controller import Controller
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
         RecordError,
         ScanError,
         SettingError,
+        TuningError,
         UnitError,
     )
     from pidemu.explanation.explain import explain
@@ -44,6 +46,8 @@ if TYPE_CHECKING:
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
     from pidemu.simulation.simulate import Simulation, simulate
+    from pidemu.tuning.rules import TuningRule, tuning_rules
+    from pidemu.tuning.tune import Tuning, tune
 
 __version__ = "0.1.0"
 
@@ -74,6 +78,7 @@ _HOMES = {
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",
+    "TuningError": "errors",
     "UnitError": "errors",
     "Event": "controller.signals",
     "Explanation": "explanation.model",
@@ -87,9 +92,15 @@ _HOMES = {
     "Process": "process.process",
     "Record": "records.files",
     "read_record": "records.files",
+    "Robustness": "analysis.robustness",
+    "robustness": "analysis.robustness",
     "Settings": "settings.settings",
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
+    "Tuning": "tuning.tune",
+    "tune": "tuning.tune",
+    "TuningRule": "tuning.rules",
+    "tuning_rules": "tuning.rules",
 }
 
 __all__ = [
@@ -119,10 +130,14 @@ __all__ = [
     "Reading",
     "Record",
     "RecordError",
+    "Robustness",
     "ScanError",
     "SettingError",
     "Settings",
     "Simulation",
+    "Tuning",
+    "TuningError",
+    "TuningRule",
     "UnitError",
     "Verification",
     "__version__",
@@ -134,7 +149,10 @@ __all__ = [
     "read_loops",
     "read_record",
     "readings",
+    "robustness",
     "simulate",
+    "tune",
+    "tuning_rules",
     "verify",
 ]
 

@@ -105,7 +105,7 @@ def _walked(own: float, unstable: float, found: Crossings, i: int) -> float:
     return 0.0
 
 
-def _pairs(w: Floats, sizes: Floats, gains: Floats) -> tuple[Places, Places, npt.NDArray[np.bool_]]:
+def _pairs(sizes: Floats, gains: Floats) -> tuple[Places, Places, npt.NDArray[np.bool_]]:
     """Return gain and interval of frequencies of all places where the loop gain is 1, and whether it falls there."""
     with np.errstate(divide="ignore"):
         loud = np.log(sizes) + np.log(gains)[:, None] >= 0
@@ -120,7 +120,7 @@ def _continuous(loop: OpenLoop, gains: Floats) -> tuple[Floats, Crossings]:
     num, den = bare.polynomials
     picture = picture_of(bare)
     w, sizes = picture.all_sizes
-    which, at, falls = _pairs(w, sizes, gains)
+    which, at, falls = _pairs(sizes, gains)
     x, level = np.log(w), np.log(gains)[which]
 
     def size(x: Floats) -> Floats:
@@ -205,7 +205,7 @@ def _pair_crossings(exact: _Sampled, picture: Picture, gains: Floats, unstable: 
     starts = []
     for base in (own, own + h / 2):
         values = exact(picture.w, np.full(picture.w.size, base))
-        which, at, _ = _pairs(picture.w, np.abs(values), gains)
+        which, at, _ = _pairs(np.abs(values), gains)
         w = np.sqrt(picture.w[at] * picture.w[at + 1])
         phases = np.mod(np.angle(-exact(w, np.full(w.size, base))) + w * (base - own), 2 * math.pi)
         starts.append((which, w, own + phases / w))
@@ -266,7 +266,7 @@ def _real_crossings(exact: _Sampled, gains: Floats, unstable: Floats) -> Crossin
         return Crossings(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
     start = 0.0 if unstable.any() else own
     count = min(math.ceil((own - start) / h), _MOST_TURNS) + 2
-    delays = own + 2 * h - np.arange(count * _PER_SCAN + 1)[::-1] * (h / _PER_SCAN)
+    delays = np.asarray(own + 2 * h - np.arange(count * _PER_SCAN + 1)[::-1] * (h / _PER_SCAN), dtype=np.float64)
     delays = delays[delays >= 0]
     values = 1 + gains[:, None] * real(delays)
     which, at = np.nonzero((values[:, 1:] < 0) != (values[:, :-1] < 0))
@@ -297,7 +297,7 @@ def edge_gains(loop: OpenLoop, picture: Picture) -> tuple[float, float]:
     edges = np.unique(gain_factors(loop, picture))
     edges = edges[np.isfinite(edges) & (edges > 0)]
     ends = [0.0, *edges.tolist(), math.inf]
-    intervals = sorted(itertools.pairwise(ends), key=lambda x: max(abs(math.log(_inner(*x, 1.0))), 0.0))
+    intervals = sorted(itertools.pairwise(ends), key=lambda x: abs(math.log(_inner(x[0], x[1], 1.0))))
     for low, high in intervals:
         inner = replace(loop, factor=loop.factor * _inner(low, high))
         seen = picture_of(inner)

@@ -32,7 +32,9 @@ def crossings(w: Floats, values: Floats, function: Callable[[Floats], Floats], a
 
 
 def zeros(low: Floats, high: Floats, at_low: Floats, at_high: Floats, function: Callable[[Floats], Floats]) -> Floats:
-    """Return the zero in each of several intervals, by Chandrupatla's method: inverse quadratic interpolation where safe, or bisection.
+    """Return the zero in each of several intervals, by Chandrupatla's method.
+
+    Inverse quadratic interpolation where that is safe, else bisection.
 
     Parameters
     ----------

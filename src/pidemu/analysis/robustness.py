@@ -23,7 +23,7 @@ SCHEMA: Final = "pidemu-robustness-1"
 """Name and version of the form of ``pidemu robustness --json``; a change that breaks a reader counts the version up."""
 _PER_OCTAVE: Final = 12
 _OCTAVES: Final = (2, 6)
-"""The curve goes so many octaves to either side, and on beyond the gain margin and the lower gain limit, but not farther than that."""
+"""The curve goes so many octaves to either side; where the gain limits lie beyond, up to so many."""
 AID: Final = 2.0
 """The design aid is passed by where gain and dead time are off by this factor together."""
 
