@@ -56,10 +56,11 @@ def command(
     settings, process = settings_of(card, values, vendors, pv_range, op_range), parse_process(model)
     found = loop_response(settings, process, scan, (low, high))
     if picture is not None:
+        from pidemu.records.side_by_side import dials
         from pidemu.report.loop_plots import plot_loop
 
         at = "" if scan is None else f", scan {number(scan)} s"
-        plot_loop(picture, found, f"{settings.summary}\n{process.text}{at}")
+        plot_loop(picture, found, f"{settings.card.id}: {dials(settings)}\n{process.text}{at}")
     if as_json:
         print_json(found.to_dict())
     else:

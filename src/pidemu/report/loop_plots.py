@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -54,7 +55,7 @@ def plot_robustness(path: str | Path, found: Robustness, title: str) -> None:
             np.r_[half, half[::-1]], np.r_[upper, 1 / upper[::-1]], color="#333333", linestyle=(0, (5, 3)), label="a factor of two"
         )
         axis.plot([1], [1], "x", color="black", markersize=9, markeredgewidth=2, label="tuned for")
-        axis.set_xlim(0, max(2.5, min(4.0, float(g[-1]))))
+        axis.set_xlim(float(g[0]), 4.0)
         near = r[(g >= 0.5) & (g <= axis.get_xlim()[1])]
         axis.set_ylim(0, float(np.clip(1.1 * near.max(initial=0.0), 2.5, _HIGHEST)))
         axis.set_xlabel("gain ratio: process gain per gain tuned for")
@@ -88,7 +89,8 @@ def plot_loop(path: str | Path, found: LoopResponse, title: str) -> None:
         _bode(gain, phase, found)
         _nyquist(nyquist, found)
         for (name, x), dash in zip(found.gang.items(), _DASHES, strict=True):
-            gang.loglog(found.w, np.abs(x), label=name, linestyle=dash, color=COLOURS[list(found.gang).index(name)])
+            gang.plot(found.w, np.abs(x), label=name, linestyle=dash, color=COLOURS[list(found.gang).index(name)])
+        _logarithmic(gang)
         gang.set_ylabel("gang of four, gain")
         gang.set_xlabel("frequency [rad/s]")
         gang.legend(loc="best")
@@ -101,8 +103,10 @@ _DASHES: Final[tuple[Any, ...]] = ("-", (0, (6, 2)), (0, (1, 1)), (0, (6, 2, 1, 
 def _bode(gain: Axes, phase: Axes, found: LoopResponse) -> None:
     parts = {"loop L": found.loop, "controller C": found.controller, "process P": found.process}
     for (name, x), dash, colour in zip(parts.items(), _DASHES[:3], COLOURS, strict=False):
-        gain.loglog(found.w, np.abs(x), label=name, linestyle=dash, color=colour)
-        phase.semilogx(found.w, degrees(x), linestyle=dash, color=colour)
+        gain.plot(found.w, np.abs(x), label=name, linestyle=dash, color=colour)
+        phase.plot(found.w, degrees(x), linestyle=dash, color=colour)
+    _logarithmic(gain)
+    _logarithmic(phase, both=False)
     gain.axhline(1, color=_GREY, linewidth=0.8)
     phase.axhline(-180, color=_GREY, linewidth=0.8)
     if found.w[0] < found.figures.crossover < found.w[-1]:
@@ -144,8 +148,22 @@ def _figure(size: tuple[float, float], title: str) -> Figure:
 
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(visible(title), fontsize=9, x=0.01, ha="left")
+    width = round(12.5 * size[0])
+    lines = [part for line in map(visible, title.split("\n")) for part in textwrap.wrap(line, width, subsequent_indent="    ")]
+    figure.suptitle("\n".join(lines), fontsize=9, x=0.01, ha="left")
     return figure
+
+
+def _logarithmic(axis: Axes, *, both: bool = True) -> None:
+    """Scale an axis, or both, by powers of ten, written as plain numbers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    axis.set_xscale("log")
+    if both:
+        axis.set_yscale("log")
+    for scale in (axis.xaxis, axis.yaxis) if both else (axis.xaxis,):
+        scale.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        scale.set_minor_formatter(NullFormatter())
 
 
 def _write(figure: Figure, path: str | Path) -> None:
