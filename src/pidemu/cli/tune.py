@@ -13,7 +13,6 @@ from pidemu.cli.common import (
     Range,
     Time,
     assignments,
-    echo,
     heading,
     json_option,
     number,
@@ -147,7 +146,6 @@ def _print_all(found: RuleTable, title: str, process: str) -> None:
         heading("\nNot for this process or this card")
         for name, reason in found.refused.items():
             wrapped(f"{name}: {reason.splitlines()[0]}", "  - ")
-    echo()
 
 
 def _dials(t: Tuning) -> str:
