@@ -10,7 +10,7 @@ FOLDER: Final = Path(__file__).parent
 SLOW: Final = (
     "card/test_broken_folders.py", "card/test_mutations.py", "card/test_source.py", "checks/test_wrong_cards.py",
     "cli/test_cards_show_check.py", "cli/test_convert.py", "cli/test_convert_certificate.py", "cli/test_fit.py",
-    "cli/test_fleet.py", "process/test_fit_noise.py",
+    "cli/test_fleet.py", "cli/test_loop_commands.py", "process/test_fit_noise.py",
     "cli/test_matrix.py", "cli/test_start.py", "cli/test_streams.py", "cli/test_verify.py", "certificate/test_exact_law.py",
     "certificate/test_figures.py", "certificate/test_nonlinear.py", "certificate/test_proof.py",
     "conversion/test_adversarial.py", "conversion/test_adversarial_settings.py", "conversion/test_all_pairs.py",
@@ -29,6 +29,7 @@ SLOW: Final = (
     "test_docs_fleet.py", "test_doctests.py", "controller/test_controller.py", "backends/test_choice.py",
     "controller/test_faults.py", "law/test_law.py", "controller/test_modes.py", "test_packaging.py", "report/test_plots.py",
     "law/test_power_series.py", "settings/test_settings.py", "controller/test_transfers.py", "test_types.py",
+    "tuning/test_rules.py",
     "test_worked_examples.py",
 )  # fmt: skip
 """Files of more than about three seconds, and folders of which no file is fast."""

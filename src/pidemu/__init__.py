@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pidemu.analysis.robustness import Robustness, robustness
     from pidemu.card.library import cards, load_card
     from pidemu.card.load import Card
     from pidemu.controller.controller import Controller
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
         RecordError,
         ScanError,
         SettingError,
+        TuningError,
         UnitError,
     )
     from pidemu.explanation.explain import explain
@@ -49,6 +51,8 @@ if TYPE_CHECKING:
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
     from pidemu.simulation.simulate import Simulation, simulate
+    from pidemu.tuning.rules import TuningRule, tuning_rules
+    from pidemu.tuning.tune import Tuning, tune
 
 __version__ = "0.1.0"
 
@@ -80,6 +84,7 @@ _HOMES = {
     "RecordError": "errors",
     "ScanError": "errors",
     "SettingError": "errors",
+    "TuningError": "errors",
     "UnitError": "errors",
     "Event": "controller.signals",
     "Explanation": "explanation.model",
@@ -99,9 +104,15 @@ _HOMES = {
     "test_batch": "process.batch",
     "Record": "records.files",
     "read_record": "records.files",
+    "Robustness": "analysis.robustness",
+    "robustness": "analysis.robustness",
     "Settings": "settings.settings",
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
+    "Tuning": "tuning.tune",
+    "tune": "tuning.tune",
+    "TuningRule": "tuning.rules",
+    "tuning_rules": "tuning.rules",
 }
 
 __all__ = [
@@ -134,10 +145,14 @@ __all__ = [
     "Record",
     "RecordError",
     "RelayTest",
+    "Robustness",
     "ScanError",
     "SettingError",
     "Settings",
     "Simulation",
+    "Tuning",
+    "TuningError",
+    "TuningRule",
     "UnitError",
     "Verification",
     "__version__",
@@ -152,8 +167,11 @@ __all__ = [
     "read_record",
     "readings",
     "relay_test",
+    "robustness",
     "simulate",
     "test_batch",
+    "tune",
+    "tuning_rules",
     "verify",
 ]
 

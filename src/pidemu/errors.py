@@ -16,6 +16,7 @@
     │   └── FitRefusedError  a record tells nothing about the process
     ├── CertificateError     a file is not the certificate of a conversion, so that it cannot be verified
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
+    ├── TuningError          a tuning rule is unknown, or does not serve this process
     └── ConversionRefusedError    the target cannot do what the source does; holds the nearest settings
         └── QuestionError         what was given can mean several things, and the result depends on which; holds the questions
 
@@ -168,6 +169,10 @@ class CertificateError(PidemuError):
 
 class ProcessError(PidemuError):
     """A process model cannot be one, or a controller cannot close a loop with it."""
+
+
+class TuningError(PidemuError):
+    """A tuning rule is unknown, does not serve this process, or a parameter of it cannot be used."""
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

@@ -9,7 +9,17 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
-from tools.regenerate import card_reference, card_schema, conversion_schema, emulation, matrix, pages, process_schemas, tables
+from tools.regenerate import (
+    card_reference,
+    card_schema,
+    conversion_schema,
+    emulation,
+    loop_schemas,
+    matrix,
+    pages,
+    process_schemas,
+    tables,
+)
 from tools.regenerate.pages import ROOT
 
 _SHOWN: Final = 160
@@ -41,12 +51,17 @@ class Generated:
         (ROOT / self.name).write_text(text, encoding="utf-8", newline="\n")
 
 
+def _schema(name: str, _there: str) -> str:
+    return loop_schemas.text(name)
+
+
 _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/card.schema.json", lambda _: card_schema.text()),
     Generated("specs/card-language.md", card_reference.updated),
     Generated("specs/conversion.schema.json", lambda _: conversion_schema.text()),
     Generated("specs/fit.schema.json", lambda _: process_schemas.fit_text()),
     Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
+    *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "robustness", "bode")),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),
     Generated("docs/matrix.md", lambda _: matrix.page()),

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from pidemu.analysis.crossings import crossings
 from pidemu.analysis.loop_figures import LoopFigures
 from pidemu.analysis.open_loop import PER_DECADE, OpenLoop, OpenLoopResponse, picture_of
 from pidemu.arrays import Floats
@@ -29,8 +29,6 @@ _PEAKS: Final = 4
 """So many peaks of a sensitivity are looked at."""
 _EDGE: Final = 1e10
 """A sensitivity beyond this is one of a loop on the edge of stability, which rounding put on its stable side."""
-_RESOLUTION: Final = 4e-15
-"""How near a frequency is found, as a share of it: a few units in the last place of its logarithm."""
 
 
 def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = math.nan) -> LoopFigures:
@@ -66,7 +64,7 @@ def loop_figures(law: Law, process: Process, factor: float = 1.0, iae: float = m
     if not loop.gain:
         return LoopFigures(process.is_stable, math.inf, math.inf, math.inf, math.nan, 1.0, 0.0, iae)
     picture = picture_of(loop)
-    crossovers = _crossovers(loop, picture)
+    crossovers = crossovers_of(loop, picture)
     Ms, Mt = _largest(loop, picture, lambda x: 1 / np.abs(1 + x)), _largest(loop, picture, lambda x: np.abs(x / (1 + x)))
     unstable = loop.unstable(picture, crossovers) or not Ms < _EDGE
     phases = np.angle(-loop(crossovers)) if crossovers.size else np.array([])  # from -180 degrees
@@ -95,7 +93,7 @@ def time_scale(law: Law, process: Process, factor: float = 1.0) -> float:
     """
     loop = OpenLoop(law, process, factor)
     if loop.gain:
-        crossovers = _crossovers(loop, picture_of(loop))
+        crossovers = crossovers_of(loop, picture_of(loop))
         if crossovers.size:
             return float(1 / crossovers[-1])
     return process.time or 1.0
@@ -123,7 +121,7 @@ def crossover(controller: Callable[[Floats], Response], process: Process, scan: 
     low, high = min(corners) * 1e-5, max(corners) * 1e5 if scan is None else math.pi / scan
     low = min(low, high * 1e-5)
     w = np.geomspace(low, high, math.ceil(2 * PER_DECADE * math.log10(high / low)))
-    found = _crossings(w, decibel(w), decibel)
+    found = crossings(w, decibel(w), decibel)
     return float(found[-1]) if found.size else None
 
 
@@ -146,60 +144,33 @@ def settling_time(settings: Settings, process: Process, h: float) -> float:
     return 8 * max(time_scale(law, process), process.delay, slow, h)
 
 
-def _crossings(w: Floats, values: Floats, function: Callable[[Floats], Floats], among: npt.ArrayLike = True) -> Floats:
-    """Return where a function is zero, between values of different signs, in the intervals `among`.
-
-    By Chandrupatla's method on a logarithmic scale: inverse quadratic interpolation where it is safe, else bisection.
-    """
-    at = np.flatnonzero(((values[1:] < 0) != (values[:-1] < 0)) & among)
-    x1, x2 = np.log(w[at + 1]), np.log(w[at])
-    f1, f2 = values[at + 1], values[at]
-    share = np.full(at.size, 0.5)
-    for _ in range(60 if at.size else 0):
-        x = x1 + share * (x2 - x1)
-        f = function(np.exp(x))
-        same = (f < 0) == (f1 < 0)
-        x3, f3 = np.where(same, x1, x2), np.where(same, f1, f2)
-        x2, f2 = np.where(same, x2, x1), np.where(same, f2, f1)
-        x1, f1 = x, f
-        least = _RESOLUTION / np.maximum(np.abs(x2 - x1), _RESOLUTION)
-        if np.all((least >= 0.5) | (f1 == 0)):
-            break
-        share = np.clip(_interpolated(x1, x2, x3, f1, f2, f3), least, 1 - least)
-    return np.exp(np.where(np.abs(f1) < np.abs(f2), x1, x2))
-
-
-def _interpolated(x1: Floats, x2: Floats, x3: Floats, f1: Floats, f2: Floats, f3: Floats) -> Floats:
-    """Return how far from `x1` to `x2` the zero is, by inverse quadratic interpolation where that stays between, else a half."""
-    with np.errstate(all="ignore"):
-        xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
-        found = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
-        safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(found)
-    return np.where(safe, found, 0.5)
-
-
-def _crossovers(loop: OpenLoop, picture: OpenLoopResponse) -> Floats:
+def crossovers_of(loop: OpenLoop, picture: OpenLoopResponse) -> Floats:
     """Return where the loop gain is 1 [rad/s]."""
     w, sizes = picture.all_sizes
     with np.errstate(divide="ignore"):  # nothing comes through a process with a zero at 0, as far down as floating point goes
-        return _crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
+        return crossings(w, np.log(sizes), lambda x: np.log(np.abs(loop(x))))
 
 
-def _gain_margin(loop: OpenLoop, picture: OpenLoopResponse) -> float:
-    """Return the factor nearest to 1 by which the loop gain may change; infinite where there is none.
+def gain_factors(loop: OpenLoop, picture: OpenLoopResponse) -> Floats:
+    """Return the factors of the loop gain at which a root crosses the edge of stability.
 
     The open loop also is a real number where the frequencies end: at the Nyquist frequency of a sampled loop, and at zero frequency
     where nothing integrates.
     """
     w, values = picture.w, picture.values
     behind = (values[1:].real < 0) & (values[:-1].real < 0)
-    sizes = [np.abs(loop(_crossings(w, values.imag, lambda x: loop(x).imag, behind)))]
+    sizes = [np.abs(loop(crossings(w, values.imag, lambda x: loop(x).imag, behind)))]
     if not loop.integrates and values[0].real < 0:
         sizes.append(np.abs(values[:1]))
     if loop.law.scan is not None and values[-1].real < 0 and w[-1] >= math.pi / loop.law.scan * (1 - 1e-9):
         sizes.append(np.abs(values[-1:]))
     with np.errstate(divide="ignore"):  # nothing comes through
-        factors = 1 / np.concatenate(sizes)
+        return np.asarray(1 / np.concatenate(sizes), dtype=np.float64)
+
+
+def _gain_margin(loop: OpenLoop, picture: OpenLoopResponse) -> float:
+    """Return the factor nearest to 1 by which the loop gain may change; infinite where there is none."""
+    factors = gain_factors(loop, picture)
     return float(factors[np.argmin(np.abs(np.log(factors)))]) if factors.size else math.inf
 
 

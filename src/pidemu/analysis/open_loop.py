@@ -78,7 +78,7 @@ class OpenLoop:
         return abs(self.factor) * low_frequency_sign(self.law.algorithm) * self.process.feedback_sign
 
     @cached_property
-    def _damped(self) -> Process:
+    def damped(self) -> Process:
         """The process with poles a hair inside the stable region where they are on its edge, off the origin."""
         poles = [
             complex(-_DAMPING * abs(p), p.imag) if p.imag and abs(p.real) < _DAMPING * abs(p) else p for p in self.process.poles
@@ -87,7 +87,7 @@ class OpenLoop:
 
     @cached_property
     def _process_response(self) -> Callable[[npt.ArrayLike], Response]:
-        return self._damped.response if self.law.scan is None else self._damped.sampled(self.law.scan).response
+        return self.damped.response if self.law.scan is None else self.damped.sampled(self.law.scan).response
 
     def __call__(self, w: npt.ArrayLike) -> Response:
         """Return the response of the open loop at frequencies [rad/s]."""
@@ -115,12 +115,16 @@ class OpenLoop:
                 return True  # a loop gain above 1 that the dead time has turned round many times
             poles = sum(p.real > 0 for p in self.process.poles)
             return unstable_sampled(picture.values, poles, self.integrates)
+        return unstable_continuous(*self.polynomials, self.process.delay, crossovers)
+
+    @property
+    def polynomials(self) -> tuple[Floats, Floats]:
+        """Numerator and denominator of a continuous open loop without its dead time, coefficients ascending."""
         num, den = self.law.feedback.num, self.law.feedback.den
         if num[0] == den[0] == 0:  # a common factor s of a controller without integral action
             num, den = num[1:], den[1:]
         P = self.process.rational
-        top, bottom = np.convolve(num, P.num) * self.gain, np.convolve(den, P.den)
-        return unstable_continuous(top, bottom, self.process.delay, crossovers)
+        return np.convolve(num, P.num) * self.gain, np.convolve(den, P.den)
 
 
 def low_frequency_sign(a: Algorithm) -> float:

@@ -30,23 +30,34 @@ def unstable_continuous(num: Floats, den: Floats, delay: float, crossovers: Floa
     crossovers : ndarray of float, shape (m,)
         Frequencies at which its gain is 1 [rad/s].
     """
-    num, den = np.trim_zeros(num, "b"), np.trim_zeros(den, "b")
-    if delay and (num.size > den.size or (num.size == den.size and abs(num[-1]) >= abs(den[-1]))):
-        return True  # a derivative without filter: the loop gain never falls below 1, and dead time turns it for ever
-    size = max(num.size, den.size)
-    closed = np.pad(num, (0, size - num.size)) + np.pad(den, (0, size - den.size))
-    roots = _roots(closed)
-    count = int(np.sum(roots.real >= -_EDGE * np.abs(roots)))
+    if delay and turns_for_ever(num, den):
+        return True
+    count, at_zero = without_delay(num, den)
     if not delay:
         return count > 0
-    if closed[0] == 0:
-        return True  # a root at zero, whatever the dead time
+    if at_zero:
+        return True
     for w in crossovers:
         value, slightly_more = (_value(num, den, x) for x in (w, w * (1 + 1e-6)))
         first = math.fmod(float(np.angle(value)) + math.pi, 2 * math.pi)  # of w delay, where L is -1
         passed = math.floor((w * delay - first) / (2 * math.pi)) + 1 if w * delay >= first else 0
         count += (2 if abs(slightly_more) < abs(value) else -2) * passed
     return count > 0
+
+
+def turns_for_ever(num: Floats, den: Floats) -> bool:
+    """Tell whether the loop gain never falls below 1, so that any dead time turns it for ever: a derivative without filter."""
+    num, den = np.trim_zeros(num, "b"), np.trim_zeros(den, "b")
+    return bool(num.size > den.size or (num.size == den.size and abs(num[-1]) >= abs(den[-1])))
+
+
+def without_delay(num: Floats, den: Floats) -> tuple[int, bool]:
+    """Return how many roots of ``num + den`` are not stable, and whether one is at zero, where it stays whatever the dead time."""
+    num, den = np.trim_zeros(num, "b"), np.trim_zeros(den, "b")
+    size = max(num.size, den.size)
+    closed = np.pad(num, (0, size - num.size)) + np.pad(den, (0, size - den.size))
+    roots = _roots(closed)
+    return int(np.sum(roots.real >= -_EDGE * np.abs(roots))), not closed[0]
 
 
 def _roots(ascending: Floats) -> Complexes:
@@ -66,7 +77,12 @@ def _value(num: Floats, den: Floats, w: float) -> complex:
 
 
 def unstable_sampled(values: Response, poles: int, integrators: int) -> bool:
-    """Tell whether the closed sampled loop has a pole on or outside the unit circle, by Nyquist's criterion.
+    """Tell whether the closed sampled loop has a pole on or outside the unit circle; see `outside_the_unit_circle`."""
+    return not (1 + values).all() or outside_the_unit_circle(values, poles, integrators) > 0.25
+
+
+def outside_the_unit_circle(values: Response, poles: int, integrators: int) -> float:
+    """Return how many poles of the closed sampled loop are outside the unit circle, by Nyquist's criterion.
 
     ``1 + L`` is 1 at infinity and has as many zeros as poles. Along the upper half of the unit circle it turns by pi for every pole
     outside, back by pi for every zero outside, and by half of that for a pole at ``z = 1``.
@@ -81,10 +97,7 @@ def unstable_sampled(values: Response, poles: int, integrators: int) -> bool:
         Poles at ``z = 1``.
     """
     f = 1 + values
-    if not f.all():
-        return True  # a pole on the unit circle
     turned = float(np.sum(np.angle(f[1:] / f[:-1])))
     if abs(values[-1]) < 1:
         turned -= float(np.angle(f[-1]))  # on to the real axis
-    zeros = poles + integrators / 2 - turned / math.pi
-    return zeros > 0.25
+    return poles + integrators / 2 - turned / math.pi

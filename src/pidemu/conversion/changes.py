@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import pidemu
-from pidemu.conversion.comparison import DIAL, Change, Comparison, same, text
+from pidemu.conversion.comparison import DIAL, Change, ValueComparison, same, text
 from pidemu.conversion.document import card_versions
 from pidemu.conversion.result import Conversion
 from pidemu.conversion.schema import Dial, TargetDial
@@ -36,7 +36,7 @@ def changes(signed: Signed, c: Conversion) -> Iterator[Change]:
     """Yield what is not as the certificate says, the settings first."""
     now, said = c.to_dict(), signed.plain
     program, words = signed.pidemu == pidemu.__version__, _is_same(signed, c)
-    compare = Comparison(words=words, complete=program)
+    compare = ValueComparison(words=words, complete=program)
     yield from _dials("dial", signed.to.settings, now["to"]["settings"])
     yield from _dials("dial before", signed.source.settings, now["from"]["settings"])
     yield from _options("option", signed.to.options, now["to"]["options"])
@@ -44,7 +44,7 @@ def changes(signed: Signed, c: Conversion) -> Iterator[Change]:
     yield from _sides(said, now)
     yield from _verdicts(signed, c, words)
     yield from _conditions(signed, c, compare)
-    yield from Comparison(words=True, complete=program).of("action", "", said["action"], now["action"])
+    yield from ValueComparison(words=True, complete=program).of("action", "", said["action"], now["action"])
     yield from compare.of("bench check", "", said["bench_check"], now["bench_check"])
     yield from _plan(signed, c, compare)
     if words:  # all of it follows from these
@@ -82,7 +82,7 @@ def _is_same(signed: Signed, c: Conversion) -> bool:
 
 def _sides(said: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[Change]:
     """Yield what else is other on either side: the card, ranges, a lag in front."""
-    compare = Comparison(words=True, complete=True)
+    compare = ValueComparison(words=True, complete=True)
     for side, before in (("to", ""), ("from", " before")):
         old, new = ({k: x for k, x in d[side].items() if k not in ("settings", "options")} for d in (said, now))
         for name in dict.fromkeys([*old, *new]):
@@ -143,7 +143,7 @@ def _dial(value: tuple[Any, str] | None) -> str:
     return "not there" if value is None else f"{text(value[0])} {value[1]}".removesuffix(" 1")
 
 
-def _conditions(signed: Signed, c: Conversion, compare: Comparison) -> Iterator[Change]:
+def _conditions(signed: Signed, c: Conversion, compare: ValueComparison) -> Iterator[Change]:
     old = {(x.card, x.path): f"{x.text} ({x.status})" for x in signed.conditions}
     new = {(x.card, x.path): str(x) for x in c.conditions}
     found = [(old.get(key, "none"), new.get(key, "none")) for key in dict.fromkeys([*old, *new])]
@@ -153,7 +153,7 @@ def _conditions(signed: Signed, c: Conversion, compare: Comparison) -> Iterator[
         yield from compare.of("condition", "", signed.plain["conditions"], [x.to_dict() for x in c.conditions])
 
 
-def _plan(signed: Signed, c: Conversion, compare: Comparison) -> Iterator[Change]:
+def _plan(signed: Signed, c: Conversion, compare: ValueComparison) -> Iterator[Change]:
     """Yield what is other in the cut-over plan, where there is one."""
     plan = signed.plain.get("transfer_plan")
     if plan is None:

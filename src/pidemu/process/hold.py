@@ -92,6 +92,40 @@ class SampledProcess:
         return np.asarray(found * np.exp(-1j * at * self.scan * self.scans), dtype=np.complex128).reshape(np.shape(w))
 
 
+def responses(gain: float, poles: Sequence[complex], zeros: Sequence[complex], h: float, w: Floats, delays: Floats) -> Response:
+    """Return the response of `SampledProcess` at frequencies with a dead time for each.
+
+    Parameters
+    ----------
+    gain, poles, zeros
+        As in `pidemu.Process`.
+    h : float
+        Scan interval [s].
+    w, delays : ndarray, shape (n,)
+        Angular frequencies [rad/s], and the dead time [s] that counts at each.
+    """
+    A, B = chain(poles)
+    row, through = outputs(poles, zeros)
+    scans, fraction = _whole_scans(delays, h)
+    n = w.size
+    grown = expm1(A, B, np.concatenate([h - fraction, fraction, [h]]))
+    (after, late), (begun, whole) = (grown[0][:n], grown[1][:n]), (grown[1][n : 2 * n], grown[0][-1])
+    early = begun + (after @ begun[..., None])[..., 0]
+    turn, rest = np.exp(-1j * w * h), np.expm1(1j * w * h)
+    found = through * turn
+    if row.size:
+        left = rest[:, None, None] * np.eye(row.size) - whole
+        found = found + np.linalg.solve(left, (late + early * turn[:, None])[..., None])[..., 0] @ row
+    return np.asarray(gain * found * np.exp(-1j * w * h * scans), dtype=np.complex128)
+
+
+def _whole_scans(delays: Floats, h: float) -> tuple[Floats, Floats]:
+    """Return the whole scans in dead times [s], and what is left of each."""
+    scans = np.floor(delays / h + _WHOLE)
+    fraction = delays - scans * h
+    return scans, np.where(fraction < _WHOLE * h, 0.0, fraction)
+
+
 class Plant:
     """A sampled process that runs, in deviations from where it rests.
 
@@ -143,10 +177,8 @@ def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], dela
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
     A, B = chain(poles)
     row, through = outputs(poles, zeros)
-    scans = math.floor(delay / h + _WHOLE)
-    fraction = delay - scans * h
-    if fraction < _WHOLE * h:
-        fraction = 0.0
+    whole_scans, fractions = _whole_scans(np.array([delay]), h)
+    scans, fraction = int(whole_scans[0]), float(fractions[0])
     with np.errstate(over="ignore", invalid="ignore"):
         (whole, after, _), (_, late, begun) = expm1(A, B, (h, h - fraction, fraction))
         early = begun + after @ begun
@@ -191,7 +223,7 @@ def outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats,
     return np.array(row, dtype=np.float64), float(rest[0])
 
 
-def expm1(A: Floats, B: Floats, times: Sequence[float]) -> tuple[Floats, Floats]:
+def expm1(A: Floats, B: Floats, times: Sequence[float] | Floats) -> tuple[Floats, Floats]:
     """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B`` for several times, by series and doubling.
 
     ``F(2t) = 2 F(t) + F(t)^2``: nothing cancels in that, as it would in the squaring of ``exp(A t)``.

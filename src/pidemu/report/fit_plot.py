@@ -9,7 +9,7 @@ import numpy as np
 
 from pidemu.certificate.figures import number
 from pidemu.process.fit.fit import ProcessFit
-from pidemu.report.plots import check_picture, panels, save, style
+from pidemu.report.plots import check_picture, panels, picture_style, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ def plot_fit(path: str | Path, found: ProcessFit) -> None:
     check_picture(path)
     fit, unit = found.fit, found.process.unit
     pv, op = ("%", "%") if unit == "%/%" else unit.rsplit("/", 1)
-    with style():
+    with picture_style():
         title = f"{found.process}\n{fit.model}, {fit.method}: residuals {number(fit.rms, 3)} {pv} rms"
         figure, axes = panels((3.4, 1.4, 1.4), title)
         many = fit.time.size > _POINTS

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ENDINGS: Final = (".png", ".svg")
-_COLOURS: Final = ("#0b6bb8", "#d1571c", "#3a8f3d", "#8a4fa3", "#a07a12", "#c2407a")
+COLOURS: Final = ("#0b6bb8", "#d1571c", "#3a8f3d", "#8a4fa3", "#a07a12", "#c2407a")
 _SETPOINT, _PV, _QUIET = "#444444", "#0b6bb8", "#777777"
 _MANY: Final = 20_000
 """Samples from which a line becomes an image within an SVG."""
@@ -98,14 +98,14 @@ def plot_run(path: str | Path, settings: Settings, record: Record, playback: Pla
     check_picture(path)
     t, unit = playback.times, "%" if settings.equation.signals == "percent" else "units"
     recorded = record.output is not None and np.isfinite(record.output).any()
-    with style():
+    with picture_style():
         figure, axes = panels((3, 3, 1.2) if recorded else (3, 3), f"{settings.card.id}: {dials(settings)}")
         _signals(axes[0], t, record, unit)
-        outputs: list[Curve] = [("emulated", playback.outputs, {"color": _COLOURS[1]})]
+        outputs: list[Curve] = [("emulated", playback.outputs, {"color": COLOURS[1]})]
         if recorded and record.output is not None:
             outputs.insert(0, ("recorded", record.output, {"color": "#222222", "linewidth": 2.4, "alpha": 0.35}))
             difference = _less(playback.outputs, record.output)
-            _line(axes[2], t, difference, color=_COLOURS[1])
+            _line(axes[2], t, difference, color=COLOURS[1])
             axes[2].set_ylabel(f"emulated −\nrecorded [{unit}]")
             _window(axes[2], [difference], (), least=0.1)
         for label, values, look in outputs:
@@ -133,14 +133,14 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
     check_picture(path)
     t, outputs = comparison.times, {visible(label): values for label, values in comparison.outputs.items()}
     first, *others = outputs
-    with style():
+    with picture_style():
         figure, axes = panels((2.4, 3, 2), "\n".join(f"{run.label}: {dials(run.settings)}" for run in comparison.runs))
         _signals(axes[0], t, comparison.record, "%")
         for i, (label, values) in enumerate(outputs.items()):
             look = {"linewidth": 1.2} if i else {"linewidth": 2.6, "alpha": 0.45}
-            _line(axes[1], t, values, label=label, color=_COLOURS[i % len(_COLOURS)], **look)
+            _line(axes[1], t, values, label=label, color=COLOURS[i % len(COLOURS)], **look)
             if i:
-                _line(axes[2], t, _less(values, outputs[first]), label=label, color=_COLOURS[i % len(_COLOURS)], linewidth=1.2)
+                _line(axes[2], t, _less(values, outputs[first]), label=label, color=COLOURS[i % len(COLOURS)], linewidth=1.2)
         axes[1].set_ylabel("output [%]")
         _window(axes[1], list(outputs.values()), comparison.runs[0].limits)
         axes[2].set_ylabel(f"difference from\n{first} [%]")
@@ -149,8 +149,8 @@ def plot_comparison(path: str | Path, comparison: Comparison) -> None:
         _finish(figure, axes, t, comparison.record, path)
 
 
-def style() -> Any:
-    """Return the context in which all pictures are drawn."""
+def picture_style() -> Any:
+    """Return the style that all pictures share, to be entered with ``with``."""
     from matplotlib import rc_context
 
     return rc_context(_STYLE)  # type: ignore[arg-type]
@@ -174,7 +174,7 @@ def _signals(axis: Axes, t: Floats, record: Record, unit: str) -> None:
     """Draw setpoint, cascade setpoint and measurement."""
     shown: list[Curve] = [("setpoint", record.sp, {"color": _SETPOINT, "linewidth": 1.1})]
     if "cascade" in record.signals:
-        shown.append(("cascade setpoint", record.signals["cascade"], {"color": _COLOURS[3], "linewidth": 1.1}))
+        shown.append(("cascade setpoint", record.signals["cascade"], {"color": COLOURS[3], "linewidth": 1.1}))
     shown.append(("measurement (PV)", record.pv, {"color": _PV}))
     for label, values, look in shown:
         _line(axis, t, values, label=label, **look)

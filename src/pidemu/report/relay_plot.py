@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pidemu.certificate.figures import number
 from pidemu.process.relay import RelayTest
-from pidemu.report.plots import check_picture, panels, save, style
+from pidemu.report.plots import check_picture, panels, picture_style, save
 
 
 def plot_relay(path: str | Path, found: RelayTest) -> None:
@@ -25,7 +25,7 @@ def plot_relay(path: str | Path, found: RelayTest) -> None:
         The ending is neither, matplotlib is not installed, or the file cannot be written.
     """
     check_picture(path)
-    with style():
+    with picture_style():
         title = f"period {number(found.ultimate_period, 4)} s, 4 d/(pi a) = {number(found.ultimate_gain, 4)}"
         figure, axes = panels((3, 1.6), title if found.process is None else f"{found.process}\n{title}")
         axes[0].plot(found.time, found.measurement, color="#0b6bb8", label="measurement (PV)")

@@ -1,0 +1,1 @@
+"""Tuning rules as data, and their results in a card's dials."""
