@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
 from pidemu.card.model.marks import Names
-from pidemu.card.windup.scheme import Numbers, Scheme
+from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class WindupMadeUp(Scheme[R]):
         if self.share == 1.0:
             yield "a share of 1 keeps everything: write 'scheme: none'"
 
-    def with_numbers(self: WindupMadeUp[Reference], read: Numbers[X]) -> Scheme[X]:
+    def with_numbers(self: WindupMadeUp[Reference], read: NumberSource[X]) -> Scheme[X]:
         """Return the scheme of an algorithm."""
         return WindupMadeUp(scheme=self.scheme, share=read.pick(self.share, 1.0))
 '''
