@@ -162,7 +162,7 @@ def mixed_settings(card_id: str) -> pidemu.card.load.Settings:
 @pytest.mark.parametrize("how", ["in between", "by a signal while blocks run", "while loops are prepared"])
 def test_an_interrupted_fleet_keeps_what_is_done(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
     loops, names = alike(300, time=200.0), {t.name for t in threading.enumerate()}
-    monkeypatch.setattr(local, "_AT_ONCE", 32)
+    monkeypatch.setattr(local, "_AT_ONCE_KEPT", 32)
     done: list[int] = []
     advance, real = Progress.advance, prepare.prepared
 
