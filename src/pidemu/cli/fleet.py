@@ -232,7 +232,7 @@ def _remark(row: Mapping[str, Any]) -> str:
     """Return what is wrong with a loop that ran."""
     if row["status"] != "done":
         return str(row["status"])
-    return "" if row["settled"] else "not settled"
+    return "" if row["settled"] else "not settled" if row["settled"] is False else "ends in the dead time"
 
 
 def _loops(count: int) -> str:
