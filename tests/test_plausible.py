@@ -143,6 +143,25 @@ def test_limits_that_are_none_are_refused_where_they_are_written(limits: str) ->
         pair(limits)
 
 
+@pytest.mark.parametrize("given", [(-1e300, 100.0), (0.0, 1e41)])
+def test_output_limits_that_no_loop_has_are_refused_wherever_they_enter(given: tuple[float, float]) -> None:
+    settings, process = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4), pidemu.Process.from_lags(1, [10])
+    for use in (
+        lambda: pidemu.Controller(settings, 1.0, output_limits=given),
+        lambda: pidemu.simulate(settings, process, 1.0, output_limits=given),
+        lambda: pidemu.convert(settings, "emerson/deltav", limits=given),
+    ):
+        with pytest.raises(PidemuError, match=r"limit.*(1e\+300|1e\+41) % is not a signal"):
+            use()
+
+
+def test_an_infinite_output_limit_is_none() -> None:
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4)
+    controller = pidemu.Controller(settings, 1.0, output_limits=(-math.inf, math.inf))
+    controller.scan(50.0, 50.0)
+    assert controller.scan(100.0, -1000.0) > 100
+
+
 def test_limits_the_wrong_way_round_are_not_blamed_on_the_initial_output() -> None:
     settings, process = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4), pidemu.Process.from_lags(1, [10])
     with pytest.raises(ProcessError, match=r"output limits 100 to 0 % are not a range; give low, then high"):

@@ -420,3 +420,27 @@ def test_a_time_that_is_none_is_wrong_usage_and_no_fault_of_the_rows(time: str) 
     status, out, err = said("fleet", "good.csv", "--time", time)
     message = f"Error: Invalid value for '--time': '{time}' is not more than 0 s; write a time such as 0.5 or 10 min"
     assert (status, out, err.splitlines()[-1]) == (2, "", message)
+
+
+def test_what_is_wrong_is_told_in_the_order_of_the_lines(folder: Path) -> None:
+    rows = (
+        UNFIT,
+        FAST,
+        WRONG,
+        FAST.replace("FIC-1", "B").replace(",0.5,", ",1e300,"),
+        FAST.replace("FIC-1", "C").replace("100", "1e300"),
+    )
+    (folder / "mixed.csv").write_text(HEAD + "".join(rows) + WRONG.replace("LIC-3", "D"), encoding="utf-8")
+    status, _, err = said("fleet", "mixed.csv")
+    assert status == 1
+    assert [line.split(": ")[:2] for line in err.splitlines()] == [
+        ["mixed.csv:2", "PIC-4"], ["mixed.csv:4", "LIC-3"], ["mixed.csv:5", "B"], ["mixed.csv:6", "C"], ["mixed.csv:7", "D"],
+    ]  # fmt: skip
+
+
+def test_rows_that_make_no_loop_are_told_though_the_others_cannot_be_run(folder: Path) -> None:
+    (folder / "signals").write_text("mine", encoding="utf-8")
+    status, _, err = said("fleet", "loops.csv", "--signals", "signals")
+    assert status == 2
+    assert err.splitlines()[0] == f"loops.csv:3: LIC-3: {WHY}"
+    assert err.splitlines()[1].startswith("error: ")

@@ -385,6 +385,10 @@ def test_states_that_are_left_at_zero_are_noted_when_the_controller_goes_on(fold
         (("--initial", "outptu=1"), "--initial outptu: no such state (did you mean 'output'?); states: u, on, I, output"),
         (("--initial", "I=high"), "--initial I: 'high' is not a number"),
         (("--initial", "I=nan"), "--initial I is nan; give a finite number"),
+        (
+            ("--initial", "I=1e300"),
+            "--initial I: 1e+300 % is not a signal or a rate that a loop has, 0 to 1e+40 % in size; check the number and its unit",
+        ),
         (("--initial", "I"), "'I' is not NAME=VALUE after --initial; write for example I=30"),
         (("--initial", "u=1", "--initial", "output=2"), "the output before the first scan is given twice; give it once"),
         (("--initial", "u=1", "--initial-output", "2"), "the output before the first scan is given twice; give it once"),

@@ -198,3 +198,15 @@ USAGE = {
 def test_a_word_that_cannot_be_read_is_wrong_usage(words: tuple[str, str], message: str) -> None:
     usage = "Usage: pidemu simulate [OPTIONS] CARD NAME=VALUE...\nTry 'pidemu simulate --help' for help.\n\n"
     assert said(*WORDS, *words) == (2, "", f"{usage}Error: {message}\n")
+
+
+def test_a_run_that_ends_in_the_dead_time_says_nothing_about_settling() -> None:
+    words = ("simulate", "generic/standard", "K=5", "Ti=10", "--process", "gain=1,lag=10,delay=30", "--scan", "1", "--time", "40")
+    status, out, err = said(*words)
+    assert status == 0
+    assert ["settled", "at", "the", "end", "not", "known"] in [line.split() for line in out.splitlines()]
+    assert (
+        "note: the run ends before the dead time after the last step is over, and says nothing about settling; give a longer --time"
+        in err
+    )
+    assert strict_json(said(*words, "--json").out)["settled"] is None

@@ -76,7 +76,11 @@ def test_control_characters_are_refused_with_their_place(tmp_path: Path, data: b
 def test_control_characters_of_a_line_are_found_by_itself(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_bytes(b"a\nb\x00\n")
     text = read_text(tmp_path / "x.csv", RecordError, KIND, controls=False)
-    assert [control(line) for line in text.split("\n")] == [None, "column 2: U+0000, NUL, stands in the text; remove it", None]
+    assert [control(line) for line in text.split("\n")] == [
+        None,
+        "character 2: U+0000, NUL, stands in the text; remove it",
+        None,
+    ]
 
 
 @pytest.mark.parametrize(

@@ -137,8 +137,10 @@ WRONG = {
 WRONG["A" * 200_000] = "a cell has more than 131,072 characters; shorten it"
 WRONG["# FIC-2 is out of service"] = "1 cell, the header has 10; comments stand above the header"
 WRONG["#REF!,generic/standard,K=2; Ti=10,,,,,,,"] = "no process; every loop needs one"
-WRONG["A\x00,generic/standard,K=2; Ti=10,gain=1,,,,,,"] = "column 2: U+0000, NUL, stands in the text; remove it"
-WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,,,\u2028B,,"] = "column 43: U+2028, a line separator, stands in the text; remove it"
+WRONG["A\x00,generic/standard,K=2; Ti=10,gain=1,,,,,,"] = "column tag: character 2: U+0000, NUL, stands in the text; remove it"
+WRONG["A,generic/standard,K=2; Ti=10,gain=1,,,,,,\u2028B,,"] = (
+    "column time: character 1: U+2028, a line separator, stands in the text; remove it"
+)
 
 
 @pytest.mark.parametrize(("row", "message"), WRONG.items(), ids=range(len(WRONG)))
@@ -269,12 +271,12 @@ def test_a_byte_that_is_not_utf_8_costs_its_row(tmp_path: Path) -> None:
     table = read_loops(tmp_path / "loops.csv")
     assert [loop.tag for loop in table.loops] == ["FIC-1", "Kühler"]
     (wrong,) = table.wrong
-    assert (wrong.line, wrong.reason) == (3, "column 3: not UTF-8 text (byte 0xF6); save the file as UTF-8")
+    assert (wrong.line, wrong.reason) == (3, "column tag: character 3: not UTF-8 text (byte 0xF6); save the file as UTF-8")
 
 
 def test_a_byte_that_is_not_utf_8_in_the_header_is_said_with_its_place(tmp_path: Path) -> None:
     (tmp_path / "loops.csv").write_bytes(HEAD.encode() + b",\xf6\n" + GOOD.encode())
-    with pytest.raises(FleetError, match=r":1: column \d+: not UTF-8 text \(byte 0xF6\); save the file as UTF-8$"):
+    with pytest.raises(FleetError, match=r":1: column 11: character 1: not UTF-8 text \(byte 0xF6\); save the file as UTF-8$"):
         read_loops(tmp_path / "loops.csv")
 
 
@@ -288,3 +290,27 @@ def test_settings_that_are_not_separated_by_semicolons_are_told_so(settings: str
 def test_parts_of_a_process_that_are_not_separated_by_commas_are_told_so(process: str, tmp_path: Path) -> None:
     expected = f"'{process}' is more than one part; separate them by commas, such as gain=1.5,lag=10,delay=3"
     assert reason(tmp_path, GOOD.replace("FIC-1", "FIC-2").replace("gain=1,lag=10,delay=2", process)) == expected
+
+
+def test_a_row_with_a_hidden_character_keeps_its_tag_made_visible(tmp_path: Path) -> None:
+    hidden = GOOD.replace("FIC-1", "FIC\x07-2"), GOOD.replace("FIC-1", "FIC-3").replace("Ti", "T\x1bi")
+    table = read(tmp_path, GOOD, *hidden, GOOD.replace("FIC-1", "\x0cFIC-4\x85"))
+    assert [(w.tag, w.card, w.reason) for w in table.wrong] == [
+        ("FIC\\x07-2", "generic/standard", "column tag: character 4: U+0007, a control character, stands in the text; remove it"),
+        ("FIC-3", "generic/standard", "column settings: character 7: U+001B, an escape, stands in the text; remove it"),
+        ("FIC-4", "generic/standard", "column tag: character 1: U+000C, a form feed, stands in the text; remove it"),
+    ]
+    assert [loop.tag for loop in table.loops] == ["FIC-1"]
+
+
+def test_blanks_that_do_not_break_are_no_part_of_a_cell(tmp_path: Path) -> None:
+    assert [loop.tag for loop in read(tmp_path, GOOD.replace("FIC-1", "\xa0FIC-1\xa0")).loops] == ["FIC-1"]
+
+
+@pytest.mark.parametrize(("said", "shown"), [("sep=;", "';'"), ("sep=\t", "a tab")])
+def test_a_first_line_that_the_header_contradicts_is_the_cause(said: str, shown: str, tmp_path: Path) -> None:
+    (tmp_path / "loops.csv").write_text(f"{said}\n{HEAD}\n{GOOD}\n", encoding="utf-8")
+    cause = f"the file says that {shown} separates its cells (sep=), but its header is separated by ','; remove that line"
+    with pytest.raises(FleetError) as caught:
+        read_loops(tmp_path / "loops.csv")
+    assert str(caught.value) == f"{tmp_path / 'loops.csv'}:2: {cause}"

@@ -172,3 +172,28 @@ def test_a_decimal_comma_between_semicolons_is_named_with_its_remedy(tmp_path: P
 def test_a_header_behind_a_comment_sign_is_told_to_lose_it(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r":1: no column 'sp' among #sp, pv; remove the # of '#sp'$"):
         read(tmp_path, "#sp,pv\n1,2\n")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["sp;pv;note\n1;2;a,b\n", "sp\tpv\tnote\n1\t2\ta;b\n", 'sep=;\n# a comment\nsp;pv;note\n1;2;"c;d"\n', "sp,pv,note\n1,2,a;b\n"],
+)
+def test_a_record_is_written_with_the_delimiter_it_was_read_with(text: str, tmp_path: Path) -> None:
+    record, stream = read(tmp_path, text), io.StringIO()
+    write_record(record, {}, stream)
+    assert stream.getvalue() == text
+    stream = io.StringIO()
+    write_record(record, {"emulated": [0.5]}, stream)
+    head, row = stream.getvalue().splitlines()[-2:]
+    assert (head, row) == tuple(
+        f"{line}{record.delimiter}{x}" for line, x in zip(text.splitlines()[-2:], ("emulated", "0.5"), strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "says", "has"), [("sep=;\nsp,pv\n1,2\n", "';'", "','"), ("sep=,\nsp\tpv\n1\t2\n", "','", "a tab")]
+)
+def test_a_first_line_that_the_header_contradicts_is_the_cause(text: str, says: str, has: str, tmp_path: Path) -> None:
+    cause = f"the file says that {says} separates its cells \\(sep=\\), but its header is separated by {has}; remove that line"
+    with pytest.raises(RecordError, match=rf":2: {cause}$"):
+        read(tmp_path, text)

@@ -10,7 +10,9 @@ import pytest
 
 import pidemu
 from pidemu import Loop
-from pidemu.simulation.outcome import feedback_is_negative, has_settled, late_scan, margins_of, stability_of
+from pidemu.fleet.blocks import figures_of
+from pidemu.simulation.outcome import feedback_is_negative, has_settled, late_scan, margins_of, settled_by, stability_of
+from pidemu.simulation.simulate import run_trial
 from pidemu.simulation.trial import trial
 from tests.fleet.support import mixed
 
@@ -34,6 +36,22 @@ def standard(**given: Any) -> pidemu.Settings:
 )
 def test_settled_is_a_swing_below_a_twentieth_of_the_peak(swing: float, peak: float, settled: bool) -> None:
     assert has_settled(swing, peak) is settled
+
+
+@pytest.mark.parametrize(("time", "settled"), [(40, None), (49, None), (50, None), (52, False), (2000, False)])
+def test_a_run_that_ends_in_the_dead_time_says_nothing_about_settling(time: float, settled: bool | None) -> None:
+    """A loop that is unstable: its load step of 10 % comes at 20 s, and is seen 30 s later."""
+    process, settings = pidemu.Process.from_lags(1.0, [10], delay=30), standard(K=5, Ti=10, Td=0)
+    fleet = pidemu.Fleet([Loop("A", settings, process, 1.0)]).simulate(setpoint=0, load=(20, 10), time=time)
+    assert fleet.settled == [settled]
+    made = trial(settings, process, 1.0, setpoint=0, load=(20, 10), time=time)
+    pv, out, _ = run_trial(made)
+    assert settled_by(made, figures_of(made, pv, out)) is settled
+
+
+def test_a_run_without_a_step_is_settled() -> None:
+    made = trial(standard(K=1, Ti=10, Td=0), PROCESS, 1.0, setpoint=0, load=0, time=1)
+    assert settled_by(made, {"swing": 0.0, "peak": 0.0}) is True
 
 
 def test_the_last_part_is_a_fifth_and_ten_scans_at_least() -> None:

@@ -112,8 +112,6 @@ def command(
     loops = read_loops(file, vendors)
     if loops.skipped:
         echo(f"note: {file}: {loops.skipped}", err=True)
-    for wrong in loops.wrong:
-        echo(loops.located(wrong.line, wrong.tag, wrong.reason), err=True)
     refuse_overlap({"--table": target, "--signals": signals, "--parquet": parquet})
     partly: dict[str, Path] = {}  # where what an interrupted run has done goes
     for path in (target, parquet):
@@ -122,12 +120,15 @@ def command(
             partly[path] = instead_of(path)
             check(partly[path], FleetError, inputs(file))
     result = None
-    if loops.loops:
-        result = Fleet(loops.loops).simulate(
-            time=time, folder=signals, parquet=parquet, engine=asked_for(engine), margins=margins, cores=cores,
-            cluster=scheduler, progress=progress, resume=resume, worker_timeout=worker_timeout,
-            **given(setpoint=setpoint, load=load),
-        )  # fmt: skip
+    try:
+        if loops.loops:
+            result = Fleet(loops.loops).simulate(
+                time=time, folder=signals, parquet=parquet, engine=asked_for(engine), margins=margins, cores=cores,
+                cluster=scheduler, progress=progress, resume=resume, worker_timeout=worker_timeout,
+                **given(setpoint=setpoint, load=load),
+            )  # fmt: skip
+    finally:  # what is wrong with rows is told whatever becomes of the others
+        _tell_faults(loops, result, verbose)
     interrupted = result is not None and result.interrupted
     if target is not None and not interrupted:
         loops.write(target, result)
@@ -138,7 +139,8 @@ def command(
         print_json(_plain(loops, rows, result))
     else:
         _print(loops, rows, engines=verbose or engine is not None)
-    _say(loops, result, verbose)
+    if result is not None and result.resumed:
+        echo(f"resumed: {result.resumed:,} of {len(loops):,} loops were done already", err=True)
     if interrupted:
         echo(f"interrupted: {_done(result):,} of {len(loops):,} loops are done{_where(partly, _done(result))}", err=True)
         raise SystemExit(interrupts.status())
@@ -146,16 +148,15 @@ def command(
         raise SystemExit(1)
 
 
-def _say(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
-    """Say on stderr which loops could not be run, and whether all were; with `verbose`, how their settings were read."""
-    if result is None:
-        return
-    for loop, line, reason in zip(loops.loops, loops.lines, result.reasons, strict=True):
-        notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
-        for message in (*notes, *([reason] if reason else [])):
-            echo(loops.located(line, loop.tag, message), err=True)
-    if result.resumed:
-        echo(f"resumed: {result.resumed:,} of {len(loops):,} loops were done already", err=True)
+def _tell_faults(loops: LoopTable, result: FleetResult | None, verbose: bool) -> None:
+    """Say on stderr, line by line, which rows and loops could not be run; with `verbose`, how their settings were read."""
+    found = [(wrong.line, wrong.tag, wrong.reason) for wrong in loops.wrong]
+    if result is not None:
+        for loop, line, reason in zip(loops.loops, loops.lines, result.reasons, strict=True):
+            notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
+            found += [(line, loop.tag, message) for message in (*notes, *([reason] if reason else []))]
+    for line, tag, message in sorted(found, key=lambda one: one[0]):
+        echo(loops.located(line, tag, message), err=True)
 
 
 def _done(result: FleetResult | None) -> int:
@@ -233,7 +234,7 @@ def _remark(row: Mapping[str, Any]) -> str:
     """Return what is wrong with a loop that ran."""
     if row["status"] != "done":
         return str(row["status"])
-    return "" if row["settled"] else "not settled"
+    return "" if row["settled"] else "not settled" if row["settled"] is False else "ends in the dead time"
 
 
 def _loops(count: int) -> str:

@@ -39,7 +39,7 @@ from pidemu.formatting import json_safe
 from pidemu.process.process import parse_process
 from pidemu.records.files import Record, write_record
 from pidemu.settings.action import Action
-from pidemu.simulation.outcome import has_settled, margins_of, stability_of
+from pidemu.simulation.outcome import margins_of, settled_by, stability_of
 from pidemu.simulation.simulate import run_trial
 from pidemu.simulation.trial import Step, Trial, trial
 
@@ -53,6 +53,7 @@ _NAMES: Final = {
     "swing": "range of the error at the end",
     "error": "last error",
 }
+_SETTLED: Final = {True: "yes", False: "NO", None: "not known"}
 _MARGINS: Final = {
     "gain margin": "gain_margin",
     "phase margin [deg]": "phase_margin",
@@ -130,11 +131,11 @@ def command(
         print_json(_plain(made, choice, figures, margins))
     else:
         _print(made, choice if engine else None, figures, margins)
-    for note in (*settings.notes, *_notes(made, kind, margins, has_settled(figures["swing"], figures["peak"]))):
+    for note in (*settings.notes, *_notes(made, kind, margins, settled_by(made, figures))):
         echo(f"note: {note}", err=True)
 
 
-def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool) -> Iterator[str]:
+def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool | None) -> Iterator[str]:
     """Yield what should be known beside the figures."""
     if action == "direct" and made.settings.equation.action.fixed:
         yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
@@ -142,8 +143,10 @@ def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, sett
         yield "the feedback is positive, so that the loop has no margins; leave --action out, or give the gain the other sign"
     elif not margins.stable:
         yield "the loop is unstable: the figures are those of this run only"
-    elif not settled:
+    elif settled is False:
         yield "the measurement had not settled at the end of the run; give a longer --time, or look at the margins"
+    if settled is None:
+        yield "the run ends before the dead time after the last step is over, and says nothing about settling; give a longer --time"
     for what in made.settings.algorithm(scan=made.scan).too_coarse(made.scan):
         yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
 
@@ -161,7 +164,7 @@ def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: L
         "load": made.load_step,
         "engine": {"name": choice.engine, "reason": choice.reason},
         "figures": dict(figures),
-        "settled": has_settled(figures["swing"], figures["peak"]),
+        "settled": settled_by(made, figures),
         "stable": stability_of(made, margins),
         "margins": None if margins is None else {name: getattr(margins, name) for name in ("stable", *_MARGINS.values())},
     }
@@ -190,7 +193,7 @@ def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], mar
     ]
     table(["", ""], rows)
     heading(f"\nResult, errors from the {'start' if made.load_step is None else 'load step'} on")
-    settled = "yes" if has_settled(figures["swing"], figures["peak"]) else "NO"
+    settled = _SETTLED[settled_by(made, figures)]
     rows = [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()]
     table(["", "", ""], [*rows, ["settled at the end", settled, ""]], right=(1,))
     if margins is not None:

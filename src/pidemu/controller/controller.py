@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, isinf, isnan, nan
+from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -40,7 +40,7 @@ def _pair(limits: Sequence[float]) -> tuple[float, float]:
 
 def _limit(x: float) -> float:
     """Return an output limit; an infinite one is none."""
-    return x if isinf(x) else plausible("output limit", x, LEVEL, ScanError)
+    return plausible("output limit", x, LEVEL, ScanError) if isfinite(x) else x
 
 
 def _number(name: str, given: object) -> float:

@@ -111,19 +111,19 @@ def read_text(
 
 
 def control(line: str) -> str | None:
-    """Return where a control character, or a byte that is not UTF-8, stands in a line, and which; ``None`` where there is none.
+    """Return where a control character, or a byte that is not UTF-8, stands in a line or cell, and which; ``None`` for none.
 
     Parameters
     ----------
     line : str
-        The line, without its end.
+        The line, without its end, or a cell of it.
     """
     found = _CONTROL_OR_BYTE.search(line)
     if found is None:
         return None
     byte = ord(found[0]) - 0xDC00
     what = _NOT_UTF_8.format(byte) if 0x80 <= byte <= 0xFF else _control_message(found[0])
-    return f"column {found.start() + 1}: {what}"
+    return f"character {found.start() + 1}: {what}"
 
 
 def is_file(path: str | Path) -> bool:

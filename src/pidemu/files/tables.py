@@ -36,12 +36,25 @@ class Lines:
     delimiter : str
         What separates the cells: a comma, a semicolon or a tab, whichever the header has most of, or what a first line such as
         ``sep=;`` says, which spreadsheets write.
+    said : str
+        This first line, where there is one.
     """
 
     comments: tuple[str, ...]
     rows: tuple[tuple[int, str], ...]
     blank: int
     delimiter: str = ","
+    said: str = ""
+
+    @property
+    def contradiction(self) -> str:
+        """Where the header has other delimiters than the first line says: this, with the remedy; else empty."""
+        header = self.rows[0][1] if self.rows else ""
+        other = max(_DELIMITERS, key=header.count)
+        if not self.said or self.delimiter in header or other not in header:
+            return ""
+        says, has = (shown_delimiter(x) for x in (self.delimiter, other))
+        return f"the file says that {says} separates its cells (sep=), but its header is separated by {has}; remove that line"
 
     @property
     def skipped(self) -> str:
@@ -67,10 +80,10 @@ def split_lines(text: str, *, skip_empty_rows: bool = False) -> Lines:
     comments: list[str] = []
     rows: list[tuple[int, str]] = []
     blank = 0
-    delimiter, empty = "", " \t"
+    delimiter, empty, first = "", " \t", ""
     for number, line in enumerate(text.removesuffix("\n").split("\n") if text else (), 1):
         if number == 1 and (said := _SEPARATOR.fullmatch(line)):
-            delimiter = said[1]
+            delimiter, first = said[1], line
         elif not rows and (line.startswith("# ") or line.rstrip() == "#"):
             comments.append(line)
         elif line.strip(empty):
@@ -80,7 +93,12 @@ def split_lines(text: str, *, skip_empty_rows: bool = False) -> Lines:
             rows.append((number, line))
         else:
             blank += 1
-    return Lines(tuple(comments), tuple(rows), blank, delimiter or _DELIMITERS[0])
+    return Lines(tuple(comments), tuple(rows), blank, delimiter or _DELIMITERS[0], first)
+
+
+def shown_delimiter(delimiter: str) -> str:
+    """Return a delimiter, as a message names it."""
+    return "a tab" if delimiter == "\t" else f"'{delimiter}'"
 
 
 def split_row(line: str, delimiter: str = ",") -> list[str]:
@@ -117,7 +135,7 @@ def text_cell(value: Any) -> Any:
     return f"'{value}"
 
 
-def write_rows(stream: TextIO, rows: Iterable[Iterable[Any]], end: str = "\n") -> None:
+def write_rows(stream: TextIO, rows: Iterable[Iterable[Any]], end: str = "\n", delimiter: str = ",") -> None:
     """Write rows as CSV, each cell through `text_cell`; numbers are written so that they read back the same.
 
     Parameters
@@ -128,8 +146,10 @@ def write_rows(stream: TextIO, rows: Iterable[Iterable[Any]], end: str = "\n") -
         Cells; ``None`` is an empty one.
     end : str
         What ends a line.
+    delimiter : str
+        What separates the cells.
     """
-    writer = csv.writer(stream, lineterminator=end)
+    writer = csv.writer(stream, lineterminator=end, delimiter=delimiter)
     for row in rows:
         writer.writerow([text_cell(cell) for cell in row])
 

@@ -106,7 +106,7 @@ def read_row(tag: str, row: Mapping[str, Any]) -> Finished:
     """
     status = next((s for s in RAN if s == row["status"]), None)
     settled = _TRUTH[row["settled"]]
-    if status is None or settled is None or len(row["key"]) != _LENGTH:
+    if status is None or len(row["key"]) != _LENGTH:
         raise ValueError(tag)
     margins = {name: float(row[name]) for name in MARGINS if row[name] not in ("", None)}
     judged = Judgement(status, settled, _TRUTH[row["stable"]], margins)

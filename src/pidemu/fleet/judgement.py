@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from pidemu.fleet.blocks import BlockOutcome
-from pidemu.simulation.outcome import has_settled, stability_of
+from pidemu.simulation.outcome import settled_by, stability_of
 
 Status = Literal["done", "unstable", "ran away", "failed", "not run"]
 RAN: Final[tuple[Status, ...]] = ("done", "unstable", "ran away")
@@ -24,8 +24,9 @@ class Judgement:
     ----------
     status : {"done", "unstable", "ran away"}
         ``"unstable"``: the sampled loop is, within its limits; ``"ran away"``: the measurement outgrew all numbers.
-    settled : bool
-        Whether the measurement had settled at the end of the run (`pidemu.simulation.outcome.has_settled`).
+    settled : bool or None
+        Whether the measurement had settled at the end of the run (`pidemu.simulation.outcome.settled_by`); ``None`` where the run
+        is too short to tell.
     stable : bool or None
         Whether the loop is stable; ``None`` where that was not computed.
     margins : mapping of str to float
@@ -33,7 +34,7 @@ class Judgement:
     """
 
     status: Status
-    settled: bool
+    settled: bool | None
     stable: bool | None
     margins: Mapping[str, float]
 
@@ -52,5 +53,5 @@ def judgement(found: BlockOutcome, lane: int) -> Judgement:
     m = member.margins
     stable = stability_of(member.trial, m)
     status: Status = "ran away" if member.place in found.ran_away else "unstable" if stable is False else "done"
-    settled = has_settled(float(found.columns["swing"][lane]), float(found.columns["peak"][lane]))
+    settled = settled_by(member.trial, {name: float(found.columns[name][lane]) for name in ("swing", "peak")})
     return Judgement(status, settled, stable, {} if m is None else {name: getattr(m, name) for name in MARGINS})

@@ -65,7 +65,8 @@ class FleetResult:
         within its limits; NaN where a loop did not run, or has none. The errors count from the load step on, or from the start
         where there is none.
     settled : list of bool or None
-        Whether the measurement had settled at the end of the run: the swing is less than 5 % of the peak.
+        Whether the measurement had settled at the end of the run: the swing is less than 5 % of the peak. ``None`` where the run
+        ends before the dead time after the last step is over.
     stable : list of bool or None
         Whether the sampled loop is stable within its limits; ``None`` where that was not computed.
     scan, scans : ndarray, shape (loops,)

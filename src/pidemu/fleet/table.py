@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from pidemu.card.library import folders, load_card_by_id, loaded_files
 from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
-from pidemu.files.tables import Lines, counted, split_lines, split_row, write_table
+from pidemu.files.tables import Lines, counted, shown_delimiter, split_lines, split_row, write_table
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.prepare import reason_of
 from pidemu.fleet.result import HEADER, FleetResult
@@ -23,7 +24,6 @@ COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limit
 """Columns of a file of loops."""
 _REQUIRED: Final = COLUMNS[:4]
 _KIND: Final = Kind("a table of loops", "save it as CSV text in UTF-8, with a header line such as tag,card,settings,process")
-_DELIMITER: Final = {",": "','", ";": "';'", "\t": "a tab"}
 _ACTIONS: Final[Mapping[str, Action]] = {"reverse": "reverse", "direct": "direct"}
 
 
@@ -144,6 +144,8 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
     (head, names), *rows = lines.rows
     delimiter = lines.delimiter
     try:
+        if lines.contradiction:
+            raise FleetError(lines.contradiction)
         header = _header(_cells(names, delimiter))
     except FleetError as error:
         raise FleetError(f"{visible(str(path))}:{head}: {error}") from None
@@ -155,16 +157,18 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
         row: Mapping[str, str] = {}
         try:
             cells = _cells(line, delimiter)
-            row = {name: cell for name, cell in zip(header, cells, strict=False) if cell}
+            row = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if cell.strip()}
+            _refuse_hidden(header, cells)
             if len(cells) != len(header):
-                remedy = f"put a cell that holds {_DELIMITER[delimiter]} in quotation marks"
+                remedy = f"put a cell that holds {shown_delimiter(delimiter)} in quotation marks"
                 remedy = "comments stand above the header" if cells[0].startswith("#") and len(cells) == 1 else remedy
                 raise FleetError(f"{counted(len(cells), 'cell')}, the header has {len(header)}; {remedy}")
             loops.append(_loop(row, number, seen, vendors))
             numbers.append(number)
         except Exception as error:  # whatever it is: one wrong row among thousands stops no other
             reason = _in_one_line(error) if isinstance(error, PidemuError) else reason_of(error)
-            wrong.append(WrongRow(number, row.get("tag", ""), row.get("card", ""), reason))
+            tag, card = (visible(row.get(name, "")) for name in ("tag", "card"))
+            wrong.append(WrongRow(number, tag, card, reason))
     return LoopTable(str(path), tuple(loops), tuple(numbers), tuple(wrong), lines.skipped)
 
 
@@ -178,17 +182,27 @@ def _lines(path: str | Path) -> Lines:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    fault = control(line)
-    if fault is not None:
-        raise FleetError(fault)
+    """Return the cells of a line; what is not seen is still at their ends."""
     try:
-        return [cell.strip() for cell in split_row(line, delimiter)]
+        return split_row(line, delimiter)
     except ValueError as error:
-        raise FleetError(str(error)) from None
+        raise FleetError(control(line) or str(error)) from None
+
+
+def _refuse_hidden(header: Sequence[str], cells: Sequence[str]) -> None:
+    """Refuse a control character, or a byte that is not UTF-8, in a cell; the column is the one that the header names."""
+    for name, cell in itertools.zip_longest(header, cells, fillvalue=""):
+        fault = control(cell)
+        if fault is not None:
+            raise FleetError(f"column {name}: {fault}" if name else fault)
 
 
 def _header(cells: Sequence[str]) -> list[str]:
     """Return the names of the columns."""
+    for at, cell in enumerate(cells, 1):
+        if fault := control(cell):
+            raise FleetError(f"column {at}: {fault}")
+    cells = [cell.strip() for cell in cells]
     names = [cell.casefold() for cell in cells]
     unknown = [cell for cell, name in zip(cells, names, strict=True) if name not in COLUMNS]
     if unknown:

@@ -69,6 +69,10 @@ class Record:
         The comment lines above the header.
     skipped : str
         Which lines of the file say nothing, in words: ``skipped: 2 comment lines above the header``.
+    delimiter : str
+        What separates its cells: a comma, a semicolon or a tab.
+    said : str
+        The first line of the file, where it says so: ``sep=;``.
     """
 
     sp: Floats
@@ -88,6 +92,8 @@ class Record:
     names: Mapping[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
     skipped: str = ""
+    delimiter: str = ","
+    said: str = ""
 
     @property
     def signals(self) -> dict[str, Floats]:
@@ -130,6 +136,8 @@ def read_record(path: str | Path, needed: Sequence[str] = ("sp", "pv")) -> Recor
     shown = visible(str(path))
     if len(lines.rows) < 2:
         raise RecordError(f"{shown}: no samples; a record has a header line such as {','.join(needed)} and one line per scan")
+    if lines.contradiction:
+        raise RecordError(f"{shown}:{lines.rows[0][0]}: {lines.contradiction}")
     table = [(i, _row(f"{shown}:{i}", line, lines.delimiter)) for i, line in lines.rows]
     header = table[0][1]
     places = _places(shown, table[0][0], header, needed)
@@ -149,6 +157,8 @@ def read_record(path: str | Path, needed: Sequence[str] = ("sp", "pv")) -> Recor
         names={name: header[at] for name, at in places.items()},
         comments=lines.comments,
         skipped=lines.skipped,
+        delimiter=lines.delimiter,
+        said=lines.said,
         **columns,
     )
 
@@ -233,18 +243,18 @@ def _time(where: str, text: str) -> float | datetime:
 
 
 def write_record(record: Record, columns: Mapping[str, Iterable[float]], stream: TextIO) -> None:
-    """Write a record with its comments and with more columns.
+    """Write a record with its comments and with more columns, its cells separated as they were.
 
     Parameters
     ----------
     record : Record
-        The record, with its comments, header and rows.
+        The record, with its comments, header, rows and delimiter.
     columns : mapping
         Values of the new columns by name, written so that they read back the same.
     stream : text stream
         Where to.
     """
-    stream.writelines(f"{comment}\n" for comment in record.comments)
-    write_rows(stream, [[*record.header, *columns]])
+    stream.writelines(f"{line}\n" for line in ([record.said] if record.said else []) + [*record.comments])
     rows = zip(record.rows, *columns.values(), strict=True)
-    write_rows(stream, ([*row, *(repr(float(value)) for value in values)] for row, *values in rows))
+    write_rows(stream, [[*record.header, *columns]], delimiter=record.delimiter)
+    write_rows(stream, ([*row, *(repr(float(value)) for value in values)] for row, *values in rows), delimiter=record.delimiter)

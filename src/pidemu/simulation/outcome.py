@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -41,6 +42,22 @@ def has_settled(swing: float, peak: float) -> bool:
         The largest absolute error [%].
     """
     return bool(math.isfinite(swing) and swing <= SETTLED * peak + _NOTHING)
+
+
+def settled_by(trial: Trial, figures: Mapping[str, float]) -> bool | None:
+    """Return whether a trial had settled at its end; ``None`` where it ends before the process has answered the last step.
+
+    Parameters
+    ----------
+    trial : Trial
+        What ran.
+    figures : mapping of str to float
+        Its figures, ``swing`` and ``peak`` among them [%].
+    """
+    steps = [step[0] for step in (trial.setpoint_step, trial.load_step) if step is not None]
+    if steps and (trial.scans - 1) * trial.scan <= max(steps) + trial.process.delay:
+        return None
+    return has_settled(figures["swing"], figures["peak"])
 
 
 def feedback_is_negative(trial: Trial) -> bool:
