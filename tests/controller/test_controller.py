@@ -122,15 +122,9 @@ def test_a_scan_interval_that_is_no_positive_number_is_refused(scan: float) -> N
         pidemu.Controller(pi(), scan=scan)
 
 
-@pytest.mark.parametrize("limits", [(100, 0), (5, 5)])
+@pytest.mark.parametrize("limits", [(100, 0), (5, 5), (math.nan, 100), (0, math.nan)])
 def test_limits_that_are_no_range_are_refused(limits: tuple[float, float]) -> None:
     with pytest.raises(ScanError, match="are not a range; give low, then high"):
-        pidemu.Controller(pi(), output_limits=limits)
-
-
-@pytest.mark.parametrize("limits", [(math.nan, 100), (0, math.nan)])
-def test_a_limit_that_is_not_a_number_is_refused(limits: tuple[float, float]) -> None:
-    with pytest.raises(ScanError, match="output limit is nan; give a finite number"):
         pidemu.Controller(pi(), output_limits=limits)
 
 
