@@ -16,6 +16,10 @@ _STYLE: Final = re.compile(r"\x1b\[(0|1|32|33|36)m")
 """What a terminal is told by ourselves: bold, green, yellow, cyan, and the end of it."""
 _UNWANTED: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a terminal obeys, and what turns the order of its letters."""
+_TURNING: Final = re.compile("[\u202a-\u202e\u2066-\u2069]")
+"""Of these, what turns the order of letters: a record that goes into a pipe may hold it, since it is data there."""
+_OUTPUTS: Final = ("-o", "--table", "--parquet", "--plot", "--html", "--csv", "--out")
+"""Options with the name of a file that a command writes."""
 _LINES: Final = re.compile("[\u2028\u2029]")
 """Ends of lines to some programs; within JSON they are letters."""
 _NAN: Final = re.compile(r"\bnan\b")
@@ -42,6 +46,8 @@ def prints_no_control_characters(case: Case, said: Said) -> None:
     """A terminal obeys pidemu, and no card, tag or file."""
     for stream, text in (("stdout", said.out), ("stderr", said.err)):
         plain = _STYLE.sub("", text) if case.terminal else text
+        if stream == "stdout" and case.words[:1] in (("run",), ("compare",)) and not case.terminal:
+            plain = _TURNING.sub("", plain)
         found = _UNWANTED.search(plain) or (None if "--json" in case.words else _LINES.search(plain))
         if found:
             line = plain[: found.start()].count("\n")
@@ -83,6 +89,12 @@ RULES: Final = (
 )
 
 
+def _is_output(case: Case, name: str) -> bool:
+    """Tell whether a command was told to write a file, and to read it nowhere."""
+    places = [i for i, word in enumerate(case.words) if name in word]
+    return len(places) == 1 and places[0] > 0 and case.words[places[0]] == name and case.words[places[0] - 1] in _OUTPUTS
+
+
 def files_are_whole(case: Case, said: Said, folder: Path) -> None:
     """What was read is as it was; a result of an earlier run is as it was where the command was refused; nothing is left behind."""
     for name, content in case.files.items():
@@ -90,7 +102,7 @@ def files_are_whole(case: Case, said: Said, folder: Path) -> None:
         now = path.read_bytes() if path.is_file() else None
         if now == content:
             continue
-        if name.startswith(OLD) and said.status != 2 and now:
+        if (name.startswith(OLD) or _is_output(case, name)) and said.status != 2 and now:
             continue
         state = "gone" if now is None else f"{len(now)} bytes instead of {len(content)}"
         raise Breach("file destroyed", _where(case), f"{name} is {state}, exit status {said.status}")
