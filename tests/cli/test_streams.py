@@ -100,11 +100,12 @@ def test_no_cell_of_a_table_controls_the_terminal(folder: Path) -> None:
     (folder / "loops.csv").write_text(head + rows, encoding="utf-8")
     status, out, err = said("fleet", "loops.csv", "--time", "20")
     assert status == 1
-    assert err == "loops.csv:2: column 1: U+001B, an escape, stands in the text; remove it\n"
+    shown = "\\x1b[2J\\x9b1m\\u202ecards"
+    assert err == f"loops.csv:2: {shown}: column tag: character 1: U+001B, an escape, stands in the text; remove it\n"
     assert "a\\u202eb" in out
     assert not set("\x1b\x9b\u202e") & set(out + err)
     plain = strict_json(said("fleet", "loops.csv", "--time", "20", "--json").out)
-    assert [row["tag"] for row in plain["loops"]] == ["", "a\u202eb"]
+    assert [row["tag"] for row in plain["loops"]] == [shown, "a\u202eb"]
 
 
 def test_a_tag_on_a_certificate_does_not_control_the_terminal() -> None:

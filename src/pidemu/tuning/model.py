@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from pidemu.errors import ProcessError
 from pidemu.process.process import Process
 from pidemu.process.reduction import half_rule
 
@@ -56,7 +57,10 @@ def rule_model(process: Process) -> RuleModel:
     if why_not:
         return RuleModel(None, numbers, why_not=why_not)
     reduced = bool(process.zeros) or len(process.poles) > 1
-    short = half_rule(process) if reduced else process
+    try:
+        short = half_rule(process) if reduced else process
+    except ProcessError as error:  # leads that are longer than all that they could be taken from
+        return RuleModel(None, numbers, why_not=str(error))
     L, gain = short.delay, abs(short.gain)
     numbers |= {"Kp": gain, "L": L}
     if short.integrators:
@@ -81,6 +85,4 @@ def _not_short(process: Process) -> str:
         return "it has complex poles or zeros"
     if process.integrators > 1:
         return "it has more than one integrator"
-    if any(z.real <= 0 for z in process.zeros):
-        return "it has a zero that is not in the right half plane, for which no rule is made"
     return ""
