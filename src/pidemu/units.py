@@ -29,7 +29,7 @@ import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Final
 
 from pidemu.errors import UnitError, suggest
@@ -404,18 +404,30 @@ def from_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> 
     return _outward(role, value, unit, spans)
 
 
-def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
+@lru_cache(maxsize=4096)
+def _whole_numbers(role: Role, unit: Unit, spans: Spans, inward: bool) -> tuple[bool, int, int]:
+    """Return whether a dial is reciprocal, and numerator and denominator of the constant that converts it."""
     check_unit(role, unit)
+    c, inverted = _constant(role, unit, spans), is_reciprocal(role, unit)
+    return (inverted, c.numerator, c.denominator) if inward or inverted else (inverted, c.denominator, c.numerator)
+
+
+def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
+    """Return a dial's value by its constant, rounded once: a quotient of whole numbers is."""
+    inverted, top, bottom = _whole_numbers(role, unit, spans, inward)
     if math.isnan(value):
         raise UnitError("not a number (NaN)")
-    inverted = is_reciprocal(role, unit)
     if math.isinf(value):
         return math.copysign(0.0 if inverted else math.inf, value)
     if value == 0 and inverted:
         return math.inf
-    convert = _inward if inward else _outward
+    numerator, denominator = value.as_integer_ratio()
+    if inverted:
+        numerator, denominator = denominator, numerator
+    if denominator < 0:  # a negative value, turned over
+        numerator, denominator = -numerator, -denominator
     try:
-        return float(convert(role, Fraction(value), unit, spans))
+        return (top * numerator) / (bottom * denominator)
     except OverflowError:
         return math.copysign(math.inf, value)
 

@@ -142,21 +142,21 @@ def test_a_field_stands_where_the_choice_put_it(tmp_path: Path) -> None:
 
 
 def test_the_longest_evidence_path_wins(tmp_path: Path) -> None:
-    found = {s.path: s.key for s in loaded(tmp_path, VALID).variant().statements()}
+    found = {s.path: s.key for s in loaded(tmp_path, VALID).variant().statements}
     assert found["settings.ALPHA.unit"] == "settings"
     assert found["settings.ALPHA.default"] == "settings.ALPHA.default"
 
 
 def test_evidence_of_a_choice_covers_what_it_overlays(tmp_path: Path) -> None:
     variant = loaded(tmp_path, VALID).variant({"STRUCTURE": "I-PD"})
-    [statement] = [s for s in variant.statements() if s.path == "proportional.on"]
+    [statement] = [s for s in variant.statements if s.path == "proportional.on"]
     assert (statement.value, statement.key) == ("pv", "options")
     assert statement.evidence is not None
     assert statement.evidence.at == "p. 6"
 
 
 def test_statements_come_in_one_order_and_with_their_values(tmp_path: Path) -> None:
-    statements = loaded(tmp_path, VALID).variant().statements()
+    statements = loaded(tmp_path, VALID).variant().statements
     assert {"form": "standard", "integral.windup.tracking-time": "Ti", "settings.ALPHA.range": [0.05, 1]}.items() <= {
         s.path: s.value for s in statements
     }.items()
@@ -237,4 +237,4 @@ def test_every_problem_of_a_card_is_found_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize("card_id", card_files())
 def test_every_built_in_card_has_evidence_for_every_statement_of_every_variant(card_id: str) -> None:
     card = pidemu.load_card(card_id)
-    assert [(v.chosen, s.path) for v in variants(card) for s in v.statements() if s.evidence is None] == []
+    assert [(v.chosen, s.path) for v in variants(card) for s in v.statements if s.evidence is None] == []

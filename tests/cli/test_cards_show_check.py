@@ -32,7 +32,7 @@ def test_cards_counts_the_statements_by_status() -> None:
     [card] = strict_json(told("cards", "provox", "--json"))
     assert (card["card"], card["title"]) == ("fisher/provox", variant.card.title)
     assert list(card["status"]) == ["documented", "measured", "inferred", "assumed"]
-    assert sum(card["status"].values()) == len(variant.statements())
+    assert sum(card["status"].values()) == len(variant.statements)
 
 
 def test_cards_as_json_holds_every_card() -> None:

@@ -36,7 +36,7 @@ def test_a_preset_is_claimed_where_a_source_states_it_and_goes_with_the_start_th
         assert t.preset == STATED.get(name, "none")
         if t.preset == "none":
             continue
-        (stated,) = [s for s in variant.statements() if s.path == "transfer.preset"]
+        (stated,) = [s for s in variant.statements if s.path == "transfer.preset"]
         assert stated.key == "transfer.preset"  # evidence of its own
         assert stated.evidence is not None
         assert stated.evidence.status is Status.DOCUMENTED

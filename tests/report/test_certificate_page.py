@@ -351,7 +351,7 @@ def test_every_assumed_field_of_both_cards_is_a_condition_or_in_the_small_print(
     shown = section(page(name), small) if f"<h2>{small}</h2>" in page(name) else []
     for s in (c.source, c.settings):
         named = {(x.card, x.path) for x in c.conditions}
-        conditions = {x.key for x in s.variant.statements() if (s.card.id, x.path) in named}
+        conditions = {x.key for x in s.variant.statements if (s.card.id, x.path) in named}
         for x in (*unverified_law(s), *unverified_program(s, scan=c.scan is not None)):
             [fact] = facts([x])
             assert x.key in conditions or " ".join(f"{s.card.id}: {fact}".split()) in shown

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +16,7 @@ from pydantic import ValidationError
 from pidemu.card.document import Document, Path_, parse_file
 from pidemu.card.model.base import Evidence, Status
 from pidemu.card.model.card_file import CardFile, Equation, Setting
-from pidemu.card.references import makes_the_law, named_settings
+from pidemu.card.references import is_active, makes_the_law, named_settings
 from pidemu.card.validation import problems
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import is_hidden
@@ -155,8 +156,14 @@ class Variant:
                 return (*where, *path)
         return path
 
-    def statements(self) -> list[Statement]:
-        """Return every field of the equation with its evidence, in the order of the card."""
+    @cached_property
+    def active(self) -> frozenset[str]:
+        """The dials that the equation uses."""
+        return frozenset(name for name, setting in self.equation.settings.items() if is_active(self.equation, name, setting))
+
+    @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        """Every field of the equation with its evidence, in the order of the card."""
         found = []
         for path in leaves(self.raw):
             home = self.home(path)
@@ -166,7 +173,7 @@ class Variant:
                 value = value[step]
             sets = self.equation.settings[str(path[1])].sets if path[0] == "settings" else ""
             found.append(Statement(dotted(path), value, self.card.data.evidence.get(key or ""), key or dotted(home), sets))
-        return found
+        return tuple(found)
 
     def assumptions(self, defaulted: Iterable[str] | None = None) -> list[Statement]:
         """Return what this variant only assumes: one statement per evidence entry.
@@ -182,7 +189,7 @@ class Variant:
             option = Statement(name, self.chosen[name], self.card.data.evidence.get(key), f"{key}:{name}")
             if option.is_assumed:
                 seen[option.key] = option
-        for statement in self.statements():
+        for statement in self.statements:
             if statement.is_assumed:
                 seen.setdefault(statement.key, statement)
         return list(seen.values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,7 +18,16 @@ if TYPE_CHECKING:
     from pidemu.process.process import Process
 
 
+Limits = tuple[tuple[float, float], tuple[float, float]]
+"""Ends of loop band and full band [rad/s]."""
+Differences = tuple[Floats, Floats, Floats]
+"""Relative deviation, differences of gain [dB] and phase [deg]."""
+
 _POINTS: Final = 300
+_FINE: Final = 75
+"""Frequencies of the grid over a band, and of the finer one around its largest difference."""
+_NONE: Final = 1e-12
+"""Deviation on the grid that is rounding: nothing larger lies between."""
 _ROUNDING: Final = 1e-14
 """Part of a response's largest value that is rounding."""
 _NO_TIME: Final = 1e-9
@@ -45,7 +55,7 @@ def _derivative_time(law: Law, Ti: float) -> float:
     return Td if abs(Td) > _NO_TIME * (Ti + lag) else 0.0
 
 
-def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
+def bands(law: Law, scan: float | None, process: Process | None = None) -> Limits:
     """Return loop band and full band of a source [rad/s] (section 9).
 
     Parameters
@@ -67,23 +77,40 @@ def bands(law: Law, scan: float | None, process: Process | None = None) -> tuple
     return (low, loop), (low, max(min(100 / Td, nyquist), loop))
 
 
-def differences(source: Response, target: Response) -> tuple[Floats, Floats, Floats]:
-    """Return relative deviation, gain difference [dB] and phase difference [deg] of two responses, all without sign.
+def differences(source: Response, target: Response) -> Differences:
+    """Return relative deviation, gain difference [dB] and phase difference [deg] of responses, all without sign.
 
     A response below 1e-14 of its largest is nothing but rounding, and counts as zero: a trapezoidal integral has none at half the
     scan rate, P on PV none to the setpoint. Where both are zero there is no difference. Where one is, the differences of gain and
     phase are infinite; so is the deviation where that one is the source, and 1 where it is the target.
+
+    Parameters
+    ----------
+    source, target : ndarray of complex, shape (..., n)
+        Responses over the frequencies of one band each.
+
+    Returns
+    -------
+    deviation, gain, phase : ndarray of float, shape (..., n)
     """
-    nothing, gone = (np.abs(x) <= _ROUNDING * np.max(np.abs(x)) for x in (source, target))
+    nothing, gone = (size <= _ROUNDING * size.max(axis=-1, keepdims=True) for size in (np.abs(source), np.abs(target)))
+    if not (nothing.any() or gone.any()):
+        with np.errstate(all="ignore"):
+            return _of_ratio(target / source)
     either = nothing | gone
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = np.where(either, 1.0, target / np.where(either, 1.0, source))
-        deviation = np.where(gone, 1.0, np.abs(ratio - 1))
-        gain = np.abs(20 * np.log10(np.abs(ratio)))
-        phase = np.abs(np.degrees(np.angle(ratio)))
-    found = np.where(nothing, np.inf, deviation), np.where(either, np.inf, gain), np.where(either, np.inf, phase)
-    first, second, third = (np.where(nothing & gone, 0.0, np.where(np.isnan(x), np.inf, x)) for x in found)
-    return first, second, third
+    with np.errstate(all="ignore"):
+        deviation, gain, phase = _of_ratio(np.where(either, 1.0, target / np.where(either, 1.0, source)))
+    deviation = np.where(nothing, np.inf, np.where(gone, 1.0, deviation))
+    gain, phase = np.where(either, np.inf, gain), np.where(either, np.inf, phase)
+    deviation, gain, phase = (np.where(nothing & gone, 0.0, x) for x in (deviation, gain, phase))
+    return deviation, gain, phase
+
+
+def _of_ratio(ratio: Response) -> Differences:
+    """Return the differences that a quotient of two responses is; infinite where it is not a number."""
+    found = np.abs(ratio - 1), np.abs(20 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))
+    deviation, gain, phase = (np.where(np.isnan(x), np.inf, x) if np.isnan(x.max()) else x for x in found)
+    return deviation, gain, phase
 
 
 def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Response], low: float, high: float) -> Band:
@@ -98,46 +125,96 @@ def compare(source: Callable[[Floats], Response], target: Callable[[Floats], Res
     low, high : float
         Ends of the band [rad/s].
     """
-    w = np.geomspace(low, high, _POINTS)
+    w = _grids(((low, high),))[0]
     found = differences(source(w), target(w))
-    peaks = {int(np.argmax(x)) for x in found}
-    fine = np.concatenate([np.geomspace(w[max(k - 1, 0)], w[min(k + 1, w.size - 1)], _POINTS // 4) for k in sorted(peaks)])
-    finer = differences(source(fine), target(fine))
-    deviation, gain, phase = (np.concatenate(pair) for pair in zip(found, finer, strict=True))
-    worst = int(np.argmax(deviation))
-    at = float(np.concatenate([w, fine])[worst])
-    return Band(low, high, float(deviation[worst]), float(np.max(gain)), float(np.max(phase)), at)
+    if float(found[0].max()) < _NONE:
+        return _band(w, found)
+    fine = _around(w, found)
+    return _band(w, found, fine, differences(source(fine), target(fine)))
 
 
-def compare_paths(
-    source: Law, target: Law, path: PathName, limits: tuple[tuple[float, float], tuple[float, float]], factor: float
-) -> PathComparison:
-    """Compare one path of two laws over loop band and full band, discrete ones as a process sees them, held from scan to scan.
+@lru_cache(maxsize=64)
+def _grids(bands: tuple[tuple[float, float], ...]) -> Floats:
+    """Return frequencies of each band on a logarithmic scale, shape (bands, points)."""
+    w = np.stack([np.geomspace(low, high, _POINTS) for low, high in bands])
+    w.flags.writeable = False
+    return w
+
+
+def _around(w: Floats, found: Differences) -> Floats:
+    """Return frequencies close to those of grids at which the differences are largest, shape (..., 3 fine grids)."""
+    peaks = np.stack([x.argmax(axis=-1) for x in found], axis=-1)
+    grids = np.broadcast_to(w, found[0].shape)
+    ends = [np.take_along_axis(grids, np.clip(peaks + step, 0, _POINTS - 1), axis=-1) for step in (-1, 1)]
+    fine: Floats = np.geomspace(*ends, _FINE, axis=-1).reshape(*peaks.shape[:-1], 3 * _FINE)
+    return fine
+
+
+def _band(w: Floats, found: Differences, fine: Floats | None = None, finer: Differences | None = None) -> Band:
+    """Return the largest differences on a grid, and close to where they are largest there."""
+    worst = int(found[0].argmax())
+    largest, at = [float(x.max()) for x in found], float(w[worst])
+    if fine is not None and finer is not None:
+        close = int(finer[0].argmax())
+        at = at if largest[0] >= finer[0][close] else float(fine[close])
+        largest = [max(x, float(y.max())) for x, y in zip(largest, finer, strict=True)]
+    return Band(float(w[0]), float(w[-1]), *largest, at)
+
+
+def compare_paths(source: Law, target: Law, limits: Limits, factor: float) -> tuple[PathComparison, PathComparison]:
+    """Compare feedback and setpoint path of two laws over loop band and full band.
+
+    Discrete laws are compared as a process sees them, held from scan to scan.
 
     Parameters
     ----------
     source, target : Law
         Both continuous, or each discrete at its own scan interval.
-    path : {"feedback", "setpoint"}
-        Which path.
     limits : tuple
         Loop band and full band [rad/s].
     factor : float
         What the source's gain is multiplied by for new signal ranges.
     """
-    loop, full = (_compared(source, target, path, band, factor) for band in limits)
-    worse = loop if loop.max_deviation > full.max_deviation else full  # the full band holds the loop band
+    w = _grids(limits)
+    found = differences(factor * _on_grids(source, limits), _on_grids(target, limits))
+    if float(found[0].max()) < _NONE:
+        bands = [[_band(w[k], _part(found, path, k)) for k in (0, 1)] for path in (0, 1)]
+    else:
+        fine = _around(w, found)
+        finer = differences(factor * _by_path(source, fine), _by_path(target, fine))
+        bands = [
+            [_band(w[k], _part(found, path, k), fine[path, k], _part(finer, path, k)) for k in (0, 1)] for path in (0, 1)
+        ]
+    feedback, setpoint = (_comparison(*both) for both in bands)
+    return feedback, setpoint
+
+
+@lru_cache(maxsize=64)
+def _on_grids(law: Law, limits: Limits) -> Response:
+    """Return both paths of a law over both bands, shape (paths, bands, points); a source meets many targets."""
+    return np.stack(law.held_responses(_grids(limits)))
+
+
+def _by_path(law: Law, w: Floats) -> Response:
+    """Return the responses of the two paths at frequencies of their own, shape of `w`."""
+    return np.stack([law.held(of_path, name) for of_path, name in zip(w, _PATHS, strict=True)])
+
+
+def _part(found: Differences, path: int, band: int) -> Differences:
+    deviation, gain, phase = (x[path, band] for x in found)
+    return deviation, gain, phase
+
+
+def _comparison(loop: Band, full: Band) -> PathComparison:
+    """Return what both bands say of a path: the full band holds the loop band."""
+    worse = loop if loop.max_deviation > full.max_deviation else full
     gain, phase = max(loop.gain_db, full.gain_db), max(loop.phase_deg, full.phase_deg)
     return PathComparison(loop, Band(full.low, full.high, worse.max_deviation, gain, phase, worse.worst_at))
 
 
-def _compared(source: Law, target: Law, path: PathName, band: tuple[float, float], factor: float) -> Band:
-    return compare(lambda w: factor * source.held(w, path), lambda w: target.held(w, path), *band)
-
-
 def deviation(source: Law, target: Law, band: tuple[float, float], factor: float, path: PathName = "feedback") -> float:
     """Return the largest relative deviation of one path over one band; arguments as in `compare_paths`."""
-    return _compared(source, target, path, band, factor).max_deviation
+    return compare(lambda w: factor * source.held(w, path), lambda w: target.held(w, path), *band).max_deviation
 
 
 def certify(
@@ -162,10 +239,11 @@ def certify(
     """
     scans = [law.scan for law in at_scan or () if law.scan is not None]
     limits = bands(source, max(scans) if scans else None, process)
-    discrete = [compare_paths(*at_scan, path, limits, factor) for path in _PATHS] if at_scan else [None, None]
+    feedback, setpoint = compare_paths(source, target, limits, factor)
+    discrete = compare_paths(*at_scan, limits, factor) if at_scan else (None, None)
     return Certificate(
-        feedback=compare_paths(source, target, "feedback", limits, factor),
-        setpoint=compare_paths(source, target, "setpoint", limits, factor),
+        feedback=feedback,
+        setpoint=setpoint,
         feedback_at_scan=discrete[0],
         setpoint_at_scan=discrete[1],
         setpoint_kick=Kick(factor * source.kick(), target.kick()),

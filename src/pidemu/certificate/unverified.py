@@ -83,7 +83,7 @@ def unverified_law(settings: Settings, *, rules: bool = False, action: bool = Fa
         of_the_law = (s.makes_the_law and head != "signals") or head == "cascade"
         if of_the_law or (rules and head in ("integral", "derivative") and rest[-1] == "rule"):
             found.setdefault(s.key, s)
-    for s in settings.variant.statements() if action else ():
+    for s in settings.variant.statements if action else ():
         if (s.is_assumed or s.is_inferred) and s.path.startswith(_ACTION):
             found.setdefault(s.key, s)
     return list(found.values())
@@ -118,7 +118,7 @@ def _written(value: object) -> str:
 def _statements(settings: Settings) -> Iterator[Statement]:
     """Yield the assumed and inferred fields that are at work."""
     a = settings.algorithm()
-    for s in settings.variant.statements():
+    for s in settings.variant.statements:
         if (s.is_assumed or s.is_inferred) and _at_work(settings, a, s.path.split(".")):
             yield s
 

@@ -13,7 +13,6 @@ from pidemu.card.document import Path_
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.model.base import Form, Status
 from pidemu.card.model.card_file import Canonical
-from pidemu.card.references import is_active
 from pidemu.controller.bench import Bench
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError, Problem, UndefinedError
@@ -147,7 +146,7 @@ def plausible(variant: Variant) -> Settings:
     """Return settings with every term of the variant at work."""
     values: dict[str, object] = dict(variant.chosen)
     for name, s in variant.equation.settings.items():
-        if is_active(variant.equation, name, s) and (s.default is None or s.default in off_values(s)):
+        if name in variant.active and (s.default is None or s.default in off_values(s)):
             values[name] = working(*limits(s))
     return variant.card.settings(values)
 

@@ -51,5 +51,5 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
 
 def _counts(card: Card) -> dict[str, int]:
     """Return how many fields of the default variant have each status."""
-    found = Counter(s.evidence.status for s in card.variant().statements() if s.evidence)
+    found = Counter(s.evidence.status for s in card.variant().statements if s.evidence)
     return {s.value: found[s] for s in Status}

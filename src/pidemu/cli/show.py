@@ -17,7 +17,6 @@ from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
 from pidemu.card.model.base import Evidence
 from pidemu.card.model.card_file import Example, Setting
-from pidemu.card.references import is_active
 from pidemu.cli.common import (
     RangeArgument,
     TimeArgument,
@@ -156,7 +155,7 @@ def _settings(variant: Variant) -> None:
     rows = []
     for name, s in variant.equation.settings.items():
         about = s.about or ""
-        if not is_active(variant.equation, name, s):
+        if name not in variant.active:
             about = "not used with these options" + (f": {about}" if about else "")
         step = f"in steps of {number(s.resolution)}" if s.resolution is not None else ""
         shared = "one for many loops" if s.scope == "module" else ""
@@ -175,7 +174,7 @@ def _range(s: Setting) -> str:
 
 def _evidence(variant: Variant) -> None:
     heading("\nEvidence")
-    stated = {s.key: s.evidence for s in variant.statements() if s.evidence is not None}
+    stated = {s.key: s.evidence for s in variant.statements if s.evidence is not None}
     emulation = variant.card.data.evidence.get(EMULATION)
     if emulation is not None:
         stated = {EMULATION: emulation, **stated}

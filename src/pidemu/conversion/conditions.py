@@ -84,7 +84,7 @@ def _of(c: Conversion, s: Settings, name: str, *, is_source: bool) -> Iterator[C
         return
     a = s.algorithm()
     found: dict[str, tuple[int, Statement, str]] = {}
-    for statement in s.variant.statements():
+    for statement in s.variant.statements:
         evidence = statement.evidence
         if evidence is None or evidence.status not in (Status.ASSUMED, Status.INFERRED) or statement.path not in _MATTER:
             continue

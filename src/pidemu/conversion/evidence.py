@@ -22,7 +22,7 @@ def status_of(settings: Settings, *heads: str) -> Status:
     """
     found = [
         s.evidence.status
-        for s in settings.variant.statements()
+        for s in settings.variant.statements
         if s.evidence is not None and s.path.startswith(heads) and not s.path.endswith(".rule")
     ]
     return min(found, key=_SURENESS.index, default=Status.MEASURED)

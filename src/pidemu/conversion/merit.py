@@ -272,7 +272,7 @@ def _noise_steps(ratio: float) -> int:
 
 def _assumed(settings: Settings) -> int:
     """Return how many fields of windup, transfer and scan rules are only assumed."""
-    found = {s.key for s in settings.variant.statements() if s.is_assumed and _is_of_the_scan(s.path)}
+    found = {s.key for s in settings.variant.statements if s.is_assumed and _is_of_the_scan(s.path)}
     return len(found)
 
 

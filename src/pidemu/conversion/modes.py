@@ -42,7 +42,9 @@ def depends_on_mode(settings: Settings) -> bool:
 
 def law_in(settings: Settings, mode: Mode, scan: float | None = None) -> Law:
     """Return the law of settings in one mode; continuous, or discrete at a scan interval [s]."""
-    return Law(in_mode(settings.algorithm(scan=scan), mode), scan)
+    law = settings.law(scan)
+    a = in_mode(law.algorithm, mode)
+    return law if a is law.algorithm else Law(a, scan)
 
 
 def looked_at(mode: Modes, *settings: Settings) -> tuple[Mode, ...]:

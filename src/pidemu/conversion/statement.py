@@ -166,7 +166,7 @@ def unverified(c: Conversion) -> list[str]:
     named = {(x.card, x.path) for x in c.conditions}
     found: list[str] = []
     for s in (c.source, c.settings):
-        keys = {x.key for x in s.variant.statements() if (s.card.id, x.path) in named}
+        keys = {x.key for x in s.variant.statements if (s.card.id, x.path) in named}
         program = unverified_program(s, scan=c.scan is not None, limits=c.request.limits is not None)
         statements = [*unverified_law(s, rules=True, action=True), *program]
         found += [f"{s.card.id}: {fact}" for fact in facts(x for x in statements if x.key not in keys)]

@@ -57,7 +57,7 @@ def _what_starts(new: Takeover, way: Way, card: str) -> str:
 
 def _evidence(new: Takeover, path: str) -> Evidence | None:
     """Return what a field of the card rests on; ``None`` where the card leaves the field out."""
-    return next((s.evidence for s in new.settings.variant.statements() if s.path == path), None)
+    return next((s.evidence for s in new.settings.variant.statements if s.path == path), None)
 
 
 def _start_evidence(new: Takeover) -> Iterator[str]:

@@ -257,9 +257,9 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Law:
-    """The linear law of a controller, reverse acting.
+    """The linear law of a controller, reverse acting. Two laws are one where they are one object.
 
     Attributes
     ----------
@@ -330,9 +330,13 @@ class Law:
             Gain [%/%] and phase of the path.
         """
         self.path(path)  # refuses a wrong name
+        return self.responses(w)[0 if path == "feedback" else 1]
+
+    def responses(self, w: npt.ArrayLike) -> tuple[Response, Response]:
+        """Return the frequency responses of feedback and setpoint path; arguments and shapes as of `response`."""
         values = at_frequencies(w) if self.scan is None else at_scan(self.algorithm, self.scan, w)
-        found = paths(self.algorithm, values)[0 if path == "feedback" else 1]
-        return np.broadcast_to(np.asarray(found, dtype=np.complex128), np.shape(w)).copy()
+        feedback, setpoint = paths(self.algorithm, values)
+        return _spread(feedback, w), _spread(setpoint, w)
 
     def held(self, w: npt.ArrayLike, path: PathName = "feedback") -> Response:
         """Return the frequency response as a process sees it: of the discrete law, with the output held from scan to scan.
@@ -346,12 +350,17 @@ class Law:
         path : {"feedback", "setpoint"}
             Which path.
         """
-        found = self.response(w, path)
+        self.path(path)  # refuses a wrong name
+        return self.held_responses(w)[0 if path == "feedback" else 1]
+
+    def held_responses(self, w: npt.ArrayLike) -> tuple[Response, Response]:
+        """Return the frequency responses of feedback and setpoint path as a process sees them; see `held`."""
+        feedback, setpoint = self.responses(w)
         if self.scan is None:
-            return found
+            return feedback, setpoint
         angle = 1j * np.asarray(w, dtype=float) * self.scan
-        value: Response = found * (-np.expm1(-angle) / angle)
-        return value
+        hold = -np.expm1(-angle) / angle
+        return feedback * hold, setpoint * hold
 
     def held_expansion(self, terms: int, path: PathName = "feedback") -> tuple[float, ...]:
         """Return the first `terms` coefficients of ``s C(s)``, at most 5, of what a process sees of the law (see `held`).
@@ -463,6 +472,11 @@ class Law:
     def _continuous(self) -> None:
         if self.scan is not None:
             raise ValueError("this is the discrete law; the coefficients belong to the continuous one")
+
+
+def _spread(value: Any, w: npt.ArrayLike) -> Response:
+    """Return a response at every frequency, which may be the same at all of them."""
+    return np.broadcast_to(np.asarray(value, dtype=np.complex128), np.shape(w)).copy()
 
 
 def _trim(coefficients: Sequence[float]) -> list[float]:

@@ -11,7 +11,6 @@ from typing import Final
 from pidemu.card.load import Card, Variant, variants
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
-from pidemu.card.references import is_active
 from pidemu.checks.runs import working
 from pidemu.conversion.target.computed import is_computed
 from pidemu.errors import UndefinedError
@@ -102,7 +101,7 @@ def held_dials(card: Card) -> dict[str, float]:
 
 
 def _active(variant: Variant) -> Iterator[tuple[str, Setting]]:
-    return ((n, s) for n, s in variant.equation.settings.items() if is_active(variant.equation, n, s))
+    return ((n, s) for n, s in variant.equation.settings.items() if n in variant.active)
 
 
 def _dials(variant: Variant, derivative: bool) -> tuple[dict[str, float], list[str]]:

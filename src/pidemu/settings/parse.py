@@ -9,7 +9,6 @@ from typing import Final
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
-from pidemu.card.references import is_active
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, PlausibleSize, number, shown
 from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range
@@ -65,7 +64,7 @@ def make_settings(card: Card, given: Mapping[str, object]) -> Settings:
     faults += [_unknown(card, variant, name) for name in unknown]
     misspelt = " ".join(faults)
     for name, setting in variant.equation.settings.items():
-        active = is_active(variant.equation, name, setting)
+        active = name in variant.active
         try:
             value = _read(name, setting, names.get(name), spans, active, variant.equation.form, (bool(pv_range), bool(op_range)))
         except (UnitError, SettingError) as error:

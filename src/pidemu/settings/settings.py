@@ -143,6 +143,7 @@ class Settings(Mapping[str, Value]):
     lag: float = 0.0
     scan: float | None = field(default=None, compare=False)
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _laws: dict[float | None, Law] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Value:
         return self.values_by_name[name]
@@ -298,7 +299,9 @@ class Settings(Mapping[str, Value]):
         from pidemu.law.law import Law  # the law is made from settings, not settings from the law
 
         h = None if scan is None else plausible("scan interval", scan, INTERVAL, ScanError)
-        return Law(self.algorithm(scan=h), h)
+        if h not in self._laws:
+            self._laws[h] = Law(self.algorithm(scan=h), h)
+        return self._laws[h]
 
 
 def spans_of(pv: SignalRange | None, op: SignalRange | None, scan: float | None = None) -> Spans:

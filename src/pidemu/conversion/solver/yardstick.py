@@ -67,7 +67,7 @@ class Yardstick:
             laws = {mode: (law_in(self.source, mode), law_in(settings, mode)) for mode in others}
             found = replace(
                 found,
-                setpoint_in_cascade=compare_paths(*laws["cascade"], "setpoint", limits, self.factor),
+                setpoint_in_cascade=compare_paths(*laws["cascade"], limits, self.factor)[1],
                 kick_in_cascade=Kick(self.factor * laws["cascade"][0].kick(), laws["cascade"][1].kick()),
             )
         return found

@@ -11,7 +11,6 @@ from pidemu.algorithm.model import Algorithm
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Setting
-from pidemu.card.references import is_active
 from pidemu.conversion.target.computed import placeholder
 from pidemu.conversion.target.filter import TargetFilter
 from pidemu.conversion.target.numbers import Numbers
@@ -76,7 +75,7 @@ class Target:
     def dial(self, role: Role) -> tuple[str, Setting] | None:
         """Return the active dial that sets `role`."""
         for name, setting in self.variant.equation.settings.items():
-            if setting.sets == role.value and is_active(self.variant.equation, name, setting):
+            if setting.sets == role.value and name in self.variant.active:
                 return name, setting
         return None
 
@@ -128,7 +127,7 @@ class Target:
     def without_default(self) -> Iterator[tuple[str, Setting]]:
         """Yield the dials in use that the card has no default for."""
         for name, setting in self.variant.equation.settings.items():
-            if setting.default is None and is_active(self.variant.equation, name, setting):
+            if setting.default is None and name in self.variant.active:
                 yield name, setting
 
     def filter_base(self, n: Numbers) -> Any:
