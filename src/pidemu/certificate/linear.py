@@ -145,20 +145,20 @@ def _around(w: Floats, found: Differences) -> Floats:
     """Return frequencies close to those of grids at which the differences are largest, shape (..., 3 fine grids)."""
     peaks = np.stack([x.argmax(axis=-1) for x in found], axis=-1)
     grids = np.broadcast_to(w, found[0].shape)
-    ends = [np.take_along_axis(grids, np.clip(peaks + step, 0, _POINTS - 1), axis=-1) for step in (-1, 1)]
-    fine: Floats = np.geomspace(*ends, _FINE, axis=-1).reshape(*peaks.shape[:-1], 3 * _FINE)
-    return fine
+    low, high = (np.take_along_axis(grids, np.clip(peaks + step, 0, _POINTS - 1), axis=-1) for step in (-1, 1))
+    return np.geomspace(low, high, _FINE, axis=-1).reshape(*peaks.shape[:-1], 3 * _FINE)
 
 
 def _band(w: Floats, found: Differences, fine: Floats | None = None, finer: Differences | None = None) -> Band:
     """Return the largest differences on a grid, and close to where they are largest there."""
     worst = int(found[0].argmax())
-    largest, at = [float(x.max()) for x in found], float(w[worst])
+    deviation, gain, phase = (float(x.max()) for x in found)
+    at = float(w[worst])
     if fine is not None and finer is not None:
         close = int(finer[0].argmax())
-        at = at if largest[0] >= finer[0][close] else float(fine[close])
-        largest = [max(x, float(y.max())) for x, y in zip(largest, finer, strict=True)]
-    return Band(float(w[0]), float(w[-1]), *largest, at)
+        at = at if deviation >= finer[0][close] else float(fine[close])
+        deviation, gain, phase = (max(x, float(y.max())) for x, y in zip((deviation, gain, phase), finer, strict=True))
+    return Band(float(w[0]), float(w[-1]), deviation, gain, phase, at)
 
 
 def compare_paths(source: Law, target: Law, limits: Limits, factor: float) -> tuple[PathComparison, PathComparison]:
@@ -182,9 +182,7 @@ def compare_paths(source: Law, target: Law, limits: Limits, factor: float) -> tu
     else:
         fine = _around(w, found)
         finer = differences(factor * _by_path(source, fine), _by_path(target, fine))
-        bands = [
-            [_band(w[k], _part(found, path, k), fine[path, k], _part(finer, path, k)) for k in (0, 1)] for path in (0, 1)
-        ]
+        bands = [[_band(w[k], _part(found, path, k), fine[path, k], _part(finer, path, k)) for k in (0, 1)] for path in (0, 1)]
     feedback, setpoint = (_comparison(*both) for both in bands)
     return feedback, setpoint
 

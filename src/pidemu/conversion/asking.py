@@ -130,7 +130,7 @@ def _of_range(source: Settings, found: RangeQuestion, answers: tuple[Answer, ...
     return Question(found.kind, found.about, f"{source.card.id}: {found.text}", answers)
 
 
-def mode_is_open(source: Settings, ranking: tuple[Attempt, ...], request: Request) -> bool:
+def mode_is_open(source: Settings, ranking: Sequence[Attempt], request: Request) -> bool:
     """Whether the source is another equation in cascade, both modes count, and no choice of the target holds in both."""
     if request.mode != "both" or not depends_on_mode(source):
         return False

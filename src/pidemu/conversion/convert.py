@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
 from pidemu.certificate.models import Rounded
-from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.asking import (
     action_questions,
     ask,
@@ -21,7 +20,6 @@ from pidemu.conversion.asking import (
 )
 from pidemu.conversion.certify import full_certificate
 from pidemu.conversion.match.moments import check_optimiser
-from pidemu.conversion.match.no_match import REFUSALS
 from pidemu.conversion.match_method import Aim, read_aim
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.refusals import (
@@ -33,11 +31,9 @@ from pidemu.conversion.refusals import (
 )
 from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import Request, read_request
-from pidemu.conversion.result import Conversion, Textbook
+from pidemu.conversion.result import Conversion
 from pidemu.conversion.rounding import rounded
 from pidemu.conversion.search import make_search, nearest_attempt
-from pidemu.conversion.solver.closed_forms import textbook
-from pidemu.conversion.solver.solver import Solver
 from pidemu.conversion.unstated import unstated
 from pidemu.errors import ScanError, SettingError
 from pidemu.settings.ranges import RangeGiven
@@ -192,7 +188,6 @@ def converted(source: Settings, card: Card, request: Request, *, emulate: bool =
     conversion = replace(conversion, opens=opens)
     if shift:
         conversion = replace(conversion, refusal=shift, certificate=replace(conversion.certificate, shifts_for_good=True))
-    conversion = replace(conversion, warnings=tuple(warnings_for(conversion)))
     if conversion.refusal and not request.allow_approximate:
         raise ConversionRefusedError(conversion.refusal, conversion, what_holds(settings) if shift else ())
     return conversion
@@ -220,7 +215,7 @@ def _concluded(
     refusal: str,
     source: Settings,
     request: Request,
-    ranking: tuple[Attempt, ...],
+    ranking: Sequence[Attempt],
     *,
     emulate: bool,
 ) -> Conversion:
@@ -249,11 +244,10 @@ def _concluded(
         unrounded=unrounded,
         match=found.match,
         certificate=certificate,
-        textbook=_textbook(work),
-        warnings=(),
         refusal=refusal,
         chosen=_chosen(settings, request),
         ranking=ranking,
+        solver=work,
         factor=work.yardstick.factor,
         scan=request.scan,
         process=request.process,
@@ -291,12 +285,3 @@ def _aim(match: str | None, process: Process | None) -> Aim:
     if aim.match == "loop":
         check_optimiser()
     return aim
-
-
-def _textbook(solver: Solver) -> Textbook:
-    """Return what the textbook rule gives, with its figures."""
-    try:
-        book = textbook(solver.pair).settings
-        return Textbook(book, solver.yardstick.certify(book))
-    except REFUSALS as error:
-        return Textbook(None, None, str(error))

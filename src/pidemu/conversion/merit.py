@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 from pidemu.algorithm.model import Algorithm
+from pidemu.card.load import Variant
 from pidemu.card.model.base import Form, Status
 from pidemu.card.model.card_file import Equation
-from pidemu.card.references import is_active
 from pidemu.certificate.models import RANK, Certificate
 from pidemu.certificate.noise import noise_gain
 from pidemu.conversion.evidence import filter_status
@@ -102,13 +103,14 @@ class Merit:
     @property
     def key(self) -> tuple[float, ...]:
         """What to sort by."""
-        return astuple(self)
+        return tuple(getattr(self, name) for name in _ORDER)
 
     def worse_by(self, best: Merit) -> str:
         """Return in words by what this is worse than the best; empty where it is as good."""
         return next((_WORDS[f.name] for f in fields(self) if getattr(self, f.name) > getattr(best, f.name)), "")
 
 
+_ORDER: Final = tuple(f.name for f in fields(Merit))
 _WORDS: Final = {
     "unused": "a dial that was given is not in use",
     "setpoint": "other terms see the setpoint",
@@ -155,13 +157,11 @@ def merit(judge: Yardstick, settings: Settings, certificate: Certificate, change
         forgets=forgets(source, settings),
         noisy=not exact and ratio > _NOISY,
         verdict=_class(judge, certificate),
-        form=0
-        if source.equation.form is settings.equation.form
-        else _DISTANCE.get((source.equation.form, settings.equation.form), 3),
+        form=_form_distance(source.equation, settings.equation),
         by_number=not a.ki and settings.equation.integral.on != "none",
         dials=dials_that_differ(source, settings, judge.factor),
         rules=rules_differ(source, settings),
-        assumed=_assumed(settings),
+        assumed=_assumed(settings.variant),
         windup=a.integral.windup.scheme != b.integral.windup.scheme,
         noise=0 if exact else _noise_steps(ratio),
         derivative=not b.kd and settings.equation.derivative.on not in ("pv", "none"),
@@ -169,6 +169,58 @@ def merit(judge: Yardstick, settings: Settings, certificate: Certificate, change
         units=_other_units(source, settings),
         changed=changed,
     )
+
+
+def floor(source: Settings, variant: Variant, changed: int, unused: int) -> Merit:
+    """Return what the merit of one choice of the options is at least, by what its equation says.
+
+    Parameters
+    ----------
+    source : Settings
+        What is converted.
+    variant : Variant
+        The target with these options.
+    changed, unused : int
+        How many options are not as delivered, and how many given dials are not in use.
+    """
+    a, e = source.algorithm(), variant.equation
+    return Merit(
+        unused=unused,
+        setpoint=_least_setpoint_class(a, e),
+        form=_form_distance(source.equation, e),
+        by_number=not a.ki and e.integral.on != "none",
+        assumed=_assumed(variant),
+        windup=a.integral.windup.scheme != e.integral.windup.scheme,
+        changed=changed,
+    )
+
+
+def with_same_law(least: Merit, like: Merit) -> Merit:
+    """Return a closer floor of a choice whose continuous law is that of another one, whose merit is known."""
+    return replace(
+        like,
+        unused=least.unused,
+        nonlinear=False,
+        forgets=False,
+        noisy=False,
+        rules=False,
+        assumed=least.assumed,
+        windup=least.windup,
+        noise=0,
+        changed=least.changed,
+    )
+
+
+def _least_setpoint_class(source: Algorithm, e: Equation) -> int:
+    """Return how far the terms that see the setpoint are at least from the source's, in every mode (see `setpoint_class`)."""
+    modes = (e.proportional,) if e.cascade is None else (e.proportional, e.cascade.proportional)
+    p_may_see_it = any(p.on in ("error", "weighted") for p in modes)
+    if source.kp and source.b and (source.cascade_b is None or source.cascade_b) and not p_may_see_it:
+        return 4
+    p_sees_it = e.form is not Form.PARALLEL and all(p.on == "error" for p in modes)  # there the gain is never 0
+    if source.kp and not source.b and not source.cascade_b and p_sees_it:
+        return 3
+    return int(bool(source.kd and source.c) and e.derivative.on in ("pv", "none"))
 
 
 def forgets(source: Settings, target: Settings) -> bool:
@@ -270,9 +322,13 @@ def _noise_steps(ratio: float) -> int:
     return _UNBOUNDED if not 0 < ratio < math.inf else round(abs(math.log(ratio)) * 10)
 
 
-def _assumed(settings: Settings) -> int:
+def _form_distance(source: Equation, target: Equation) -> int:
+    return 0 if source.form is target.form else _DISTANCE.get((source.form, target.form), 3)
+
+
+def _assumed(variant: Variant) -> int:
     """Return how many fields of windup, transfer and scan rules are only assumed."""
-    found = {s.key for s in settings.variant.statements if s.is_assumed and _is_of_the_scan(s.path)}
+    found = {s.key for s in variant.statements if s.is_assumed and _is_of_the_scan(s.path)}
     return len(found)
 
 
@@ -289,8 +345,7 @@ def _other_units(source: Settings, target: Settings) -> int:
     return sum(role in old and old[role] != unit for role, unit in new.items())
 
 
-def unused(e: Equation, wanted: dict[str, object]) -> int:
+def unused(variant: Variant, wanted: Iterable[str]) -> int:
     """Return how many of the dials that the user gave are not in use."""
-    names = {n.casefold(): n for n in e.settings}
-    found = [names.get(n.casefold()) for n in wanted]
-    return sum(n is None or not is_active(e, n, e.settings[n]) for n in found)
+    used = {n.casefold() for n in variant.active}
+    return sum(n.casefold() not in used for n in wanted)

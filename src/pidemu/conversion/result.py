@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,14 +13,18 @@ from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
 from pidemu.certificate.unverified import facts, unverified_law, unverified_program
+from pidemu.conversion.advice import warnings_for
 from pidemu.conversion.beside import Beside, runner_up, stands_beside
 from pidemu.conversion.command import words_for
 from pidemu.conversion.conditions import Condition, conditions_of
 from pidemu.conversion.document import provenance
+from pidemu.conversion.match.no_match import REFUSALS
 from pidemu.conversion.match_method import Match
 from pidemu.conversion.modes import MODES
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import Request
+from pidemu.conversion.solver.closed_forms import textbook
+from pidemu.conversion.solver.solver import Solver
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
@@ -67,16 +71,14 @@ class Conversion:
         How they were found: exact, same-numbers, low-frequency, textbook, frequency, loop or constrained.
     certificate : Certificate
         How near they are.
-    textbook : Textbook
-        What the textbook rule would have given.
-    warnings : tuple of str
-        What the target does differently, in words.
     refusal : str
         Why the target refused, where these are only the nearest settings.
     chosen : dict of str to str
         Options of the target that were chosen here, because they were not stated, and are not as the card delivers them.
-    ranking : tuple of Attempt
-        The choices of the options that were looked at, the best first.
+    ranking : sequence of Attempt
+        The choices of the options, the best first; what nobody asks for is not worked out.
+    solver : Solver or None
+        What found them.
     factor : float
         What the source's gain was multiplied by for new signal ranges; negative where the action changes.
     scan : tuple of float or None
@@ -94,11 +96,10 @@ class Conversion:
     unrounded: Settings
     match: Match
     certificate: Certificate
-    textbook: Textbook
-    warnings: tuple[str, ...]
     refusal: str = ""
     chosen: Mapping[str, str] = field(default_factory=dict)
-    ranking: tuple[Attempt, ...] = ()
+    ranking: Sequence[Attempt] = ()
+    solver: Solver | None = field(default=None, repr=False, compare=False)
     factor: float = 1.0
     scan: tuple[float, float] | None = None
     process: Process | None = None
@@ -121,6 +122,21 @@ class Conversion:
     def proof(self) -> Proof | None:
         """Both laws compared without rounding; ``None`` where they are not the same anyway, or where the scans were made up for."""
         return self.certificate.proof
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What the target does differently, in words."""
+        return tuple(warnings_for(self))
+
+    @cached_property
+    def textbook(self) -> Textbook:
+        """What the textbook rule would have given."""
+        assert self.solver is not None  # there are settings
+        try:
+            book = textbook(self.solver.pair).settings
+            return Textbook(book, self.solver.yardstick.certify(book))
+        except REFUSALS as error:
+            return Textbook(None, None, str(error))
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:

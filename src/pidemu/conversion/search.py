@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -12,7 +12,7 @@ from pidemu.conversion.asking import mode_question
 from pidemu.conversion.command import set_words
 from pidemu.conversion.match_method import Aim
 from pidemu.conversion.modes import MODES, Mode
-from pidemu.conversion.options import Attempt, attempts
+from pidemu.conversion.options import Attempt, Ranking, ranking
 from pidemu.conversion.questions import Question
 from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.request import Request
@@ -64,10 +64,12 @@ class Search:
     taken: Mapping[str, object]
     source_lag: float | None
 
-    def ranking(self, mode: Mode | None = None, taken: Mapping[str, object] | None = None) -> tuple[Attempt, ...]:
-        """Return every choice of the options, the best first."""
+    def ranking(self, mode: Mode | None = None, taken: Mapping[str, object] | None = None) -> Ranking:
+        """Return the choices of the options, the best first."""
         search = self if mode is None else replace(self, request=replace(self.request, mode=mode))
-        return attempts(self.card, self.taken if taken is None else taken, search._solver, self.aim, wanted=self.request.given)
+        stay = self.taken if taken is None else taken
+        asked = self.request
+        return ranking(self.card, stay, self.source, search._solver, self.aim, wanted=asked.given, rules_matter=asked.compensate)
 
     def _solver(self, options: Mapping[str, object]) -> Solver:
         """Return what solves for the settings with these options."""
@@ -132,9 +134,9 @@ def make_search(source: Settings, card: Card, request: Request, aim: Aim) -> Sea
     return search
 
 
-def nearest_attempt(ranking: tuple[Attempt, ...]) -> tuple[Attempt, str, Settings | None]:
+def nearest_attempt(attempts: Sequence[Attempt]) -> tuple[Attempt, str, Settings | None]:
     """Return what is nearest to the source with the options as delivered or chosen by the user, and why the target refuses."""
-    first = min(ranking, key=lambda a: len(a.changed))
+    first = min(attempts, key=lambda a: len(a.changed))
     if first.solver is None or first.error is None or isinstance(first.error, ScanError):
         raise first.error or ConversionRefusedError("there are no options left to try")
     found, refusal = first.solver.refused(first.error)

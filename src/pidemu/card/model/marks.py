@@ -153,6 +153,15 @@ def without(tree: Tree, kind: type[Beyond] | type[AtRest]) -> Tree:
     return dataclasses.replace(tree, **changed) if changed else tree  # type: ignore[type-var]
 
 
+def beyond_scans(tree: Any) -> Any:
+    """Return the fields of a part, and of those below, that are not about single scans; a value that is no part as it is."""
+    part = type(tree)
+    if not dataclasses.is_dataclass(part):
+        return tree
+    per_scan = marked(part, PerScan)
+    return {f.name: beyond_scans(getattr(tree, f.name)) for f in dataclasses.fields(part) if f.name not in per_scan}
+
+
 def _way(part: type[Any], kind: type[Any]) -> tuple[tuple[str, Any, bool], ...]:
     """Return the fields that have a mark of a kind or are above one: name, mark, and whether there can be some below."""
     if (part, kind) not in _ways:
