@@ -162,6 +162,30 @@ class Variant:
         return frozenset(name for name, setting in self.equation.settings.items() if is_active(self.equation, name, setting))
 
     @cached_property
+    def dials(self) -> dict[str, tuple[str, Setting]]:
+        """By what a dial sets, the first one at work and what the card says of it."""
+        found: dict[str, tuple[str, Setting]] = {}
+        for name, setting in self.equation.settings.items():
+            if name in self.active:
+                found.setdefault(setting.sets, (name, setting))
+        return found
+
+    @property
+    def has_proportional(self) -> bool:
+        """Whether there is a proportional term on the measurement."""
+        return self.equation.proportional.on != "none"
+
+    @property
+    def has_integral(self) -> bool:
+        """Whether there is an integral term."""
+        return self.equation.integral.on != "none" and "integral" in self.dials
+
+    @property
+    def has_derivative(self) -> bool:
+        """Whether there is a derivative term."""
+        return self.equation.derivative.on != "none" and "derivative" in self.dials
+
+    @cached_property
     def statements(self) -> tuple[Statement, ...]:
         """Every field of the equation with its evidence, in the order of the card."""
         found = []

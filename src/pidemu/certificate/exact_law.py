@@ -77,8 +77,8 @@ class ExactLaw:
         return top / bottom
 
     def equals(self, other: ExactLaw) -> bool:
-        """Whether both are the same function: the cross products agree term by term."""
-        return trimmed(multiply(self.num, other.den)) == trimmed(multiply(other.num, self.den))
+        """Whether both are the same function: the cross products agree term by term, as both are in lowest terms."""
+        return self.num == other.num and self.den == other.den
 
     def __str__(self) -> str:
         """The quotient as written by hand, such as ``(2/15 + 14/5 s + 12 s^2)/(s (1 + 3/4 s))``."""
@@ -205,17 +205,17 @@ def exact_paths(a: Algorithm[Exact], names: Sequence[PathName], factor: Exact | 
     UndefinedError
         There is no continuous law.
     """
-    found: dict[PathName, ExactLaw] = {}
-    for name in names:
-        path = _quotient(a, name)
-        found[name] = ExactLaw.of([x * factor for x in trimmed(path.num)], path.den)
-    return found
+    made = _quotients(a, names)
+    return {name: ExactLaw.of([x * factor for x in trimmed(path.num)], path.den) for name, path in made.items()}
 
 
-def _quotient(a: Algorithm[Exact], name: PathName) -> Rational:
-    """Return a path as its terms make it, not in lowest terms."""
-    both: tuple[Rational, Rational] = laws.paths(in_mode(a, name), laws.CONTINUOUS)
-    return both[name != "feedback"]
+def _quotients(a: Algorithm[Exact], names: Sequence[PathName]) -> dict[PathName, Rational]:
+    """Return paths as their terms make them, not in lowest terms."""
+    feedback, setpoint = laws.paths(a, laws.CONTINUOUS)
+    found: dict[PathName, Rational] = {"feedback": feedback, "setpoint": setpoint, "setpoint in cascade": setpoint}
+    if a.cascade_b is not None and "setpoint in cascade" in names:
+        found["setpoint in cascade"] = laws.paths(a.in_cascade, laws.CONTINUOUS)[1]
+    return {name: found[name] for name in names}
 
 
 def difference(source: Algorithm[Exact], target: Algorithm[Exact], name: PathName, factor: Exact) -> float:
@@ -235,7 +235,7 @@ def difference(source: Algorithm[Exact], target: Algorithm[Exact], name: PathNam
     """
     products = []
     for one, other in ((source, target), (_sizes(source), _sizes(target))):
-        a, b = (_quotient(x, name) for x in (one, other))
+        a, b = (_quotients(x, (name,))[name] for x in (one, other))
         times = factor if one is source else abs(factor)
         products += [multiply([x * times for x in trimmed(a.num)], b.den), multiply(b.num, a.den)]
     left, right, *sizes = products

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Final
 
 from pidemu.algorithm.model import Algorithm
@@ -326,6 +327,7 @@ def _form_distance(source: Equation, target: Equation) -> int:
     return 0 if source.form is target.form else _DISTANCE.get((source.form, target.form), 3)
 
 
+@lru_cache(maxsize=1024)
 def _assumed(variant: Variant) -> int:
     """Return how many fields of windup, transfer and scan rules are only assumed."""
     found = {s.key for s in variant.statements if s.is_assumed and _is_of_the_scan(s.path)}

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, overload
+from typing import Any, Final, overload
 
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.base import Rule
@@ -15,6 +15,7 @@ from pidemu.card.model.card_file import Equation
 from pidemu.card.model.marks import beyond_scans
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.conversion.match.no_match import NoMatchError
+from pidemu.conversion.match.terms import missing_term
 from pidemu.conversion.match_method import Aim
 from pidemu.conversion.merit import Merit, floor, merit, unused, with_same_law
 from pidemu.conversion.solver.found import Found
@@ -65,7 +66,7 @@ class Attempt:
     @property
     def rank(self) -> tuple[float, ...]:
         """What to sort by: refusals last."""
-        return (1,) if self.merit is None else _rank(self.merit)
+        return _REFUSED if self.merit is None else _rank(self.merit)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain values for JSON."""
@@ -77,6 +78,9 @@ class Attempt:
             **({} if s is None else {"settings": s.to_dict()["settings"]}),
             **{name: path.loop_band.max_deviation for name, path in paths.items()},
         }
+
+
+_REFUSED: Final = (1.0,)
 
 
 def _rank(merit: Merit) -> tuple[float, ...]:
@@ -97,12 +101,15 @@ class Choice:
         Those that are not as the card delivers them.
     floor : Merit
         No merit is less.
+    is_hopeless : bool
+        Whether the target refuses, as it lacks a term.
     """
 
     variant: Variant
     options: Mapping[str, object]
     changed: Mapping[str, str]
     floor: Merit
+    is_hopeless: bool
 
 
 class Ranking(Sequence[Attempt]):
@@ -127,7 +134,7 @@ class Ranking(Sequence[Attempt]):
         self._ranked: list[Attempt] = []
         self._by_law: dict[str, Merit] = {}
         self._left: list[tuple[tuple[float, ...], int, Choice, Attempt | None]] = [
-            (_rank(choice.floor), place, choice, None) for place, choice in enumerate(choices)
+            (self._bound(choice), place, choice, None) for place, choice in enumerate(choices)
         ]
         heapq.heapify(self._left)
         self._size = len(self._left)
@@ -163,6 +170,8 @@ class Ranking(Sequence[Attempt]):
 
     def _bound(self, choice: Choice) -> tuple[float, ...]:
         """Return what a choice ranks by at best, by all that is known of it."""
+        if choice.is_hopeless:
+            return _REFUSED
         like = None if self._rules_matter else self._by_law.get(law_text(choice.variant))
         return _rank(choice.floor if like is None else with_same_law(choice.floor, like))
 
@@ -211,7 +220,7 @@ def ranking(
         if matters not in seen:
             seen.append(matters)
             least = floor(source, variant, len(changed), unused(variant, wanted))
-            choices.append(Choice(variant, options, changed, least))
+            choices.append(Choice(variant, options, changed, least, bool(missing_term(source.algorithm(), variant))))
     return Ranking(choices, lambda choice: _attempt(choice, solver, aim), rules_matter=rules_matter)
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from typing import Final
 
+from pidemu.card.load import Variant
 from pidemu.card.model.base import Form
 from pidemu.settings.range_relation import RangeQuestion, Relation, relation
 from pidemu.settings.ranges import PERCENT, RANGES, SignalRange, Which, option_of
 from pidemu.settings.settings import Settings, spans_of
-from pidemu.units import Role
+from pidemu.units import Dimension, Role, parse_unit
 
 _EXAMPLES: Final[dict[Which, str]] = {"pv_range": "0,400 degC", "op_range": "0,100 %"}
 _WORDS: Final[dict[Which, str]] = {"pv_range": "the PV range", "op_range": "the output range"}
@@ -131,8 +133,21 @@ def _grow_alike(source: Settings, target: Settings, which: Which) -> bool:
 
 def _growth(settings: Settings, which: Which) -> tuple[float | None, ...]:
     """Return by how much the three gains of the law grow where a span doubles; ``None`` where a term is not used."""
+    if not _refers_to_spans(settings.variant):
+        a = settings.algorithm()
+        return tuple(1.0 if k else None for k in (a.kp, a.ki, a.kd))
     before, after = (_at(settings, which, high).algorithm() for high in (PERCENT.high, 2 * PERCENT.high))
     return tuple(getattr(after, k) / getattr(before, k) if getattr(before, k) else None for k in ("kp", "ki", "kd"))
+
+
+@lru_cache(maxsize=1024)
+def _refers_to_spans(variant: Variant) -> bool:
+    """Whether spans matter to an equation: it computes in engineering units, or a dial at work is not in percent throughout."""
+    dials = (s for n, s in variant.equation.settings.items() if n in variant.active)
+    return variant.equation.signals == "engineering" or any(parse_unit(s.unit).dimension in _OF_SPANS for s in dials)
+
+
+_OF_SPANS: Final = (Dimension.PV_UNITS, Dimension.OP_PER_PV, Dimension.PERCENT_PER_PV, Dimension.UNITS_PER_TIME)
 
 
 def _at(settings: Settings, which: Which, high: float) -> Settings:

@@ -60,7 +60,7 @@ class Exact:
 
     def _both(self, other: Exact | Fraction | float) -> tuple[Exact, int]:
         """Return the other number, and what the root of both is taken of."""
-        o = exact(other)
+        o = other if type(other) is Exact else exact(other)
         if self.d and o.d and self.d != o.d:
             raise InexactError(f"sqrt({self.d}) and sqrt({o.d}) have no common field of two dimensions")
         return o, self.d or o.d
@@ -174,6 +174,10 @@ def _made(a: Fraction, b: Fraction = _NOTHING, d: int = 0) -> Exact:
     return x
 
 
+_SMALL: Final = {float(n): _made(Fraction(n)) for n in (-1, 0, 1, 2)}
+"""Whole numbers that equations are written with."""
+
+
 @lru_cache(maxsize=32)
 def _root(d: int) -> Fraction:
     """Return a square root to dozens of digits."""
@@ -207,7 +211,7 @@ def exact(x: Any) -> Exact:
     if isinstance(x, Fraction | int):
         return Exact(x)
     if isinstance(x, float) and x.is_integer():
-        return _made(Fraction(int(x)))
+        return _SMALL.get(x) or _made(Fraction(int(x)))
     if isinstance(x, float) and math.isfinite(x) and Fraction(x) == Fraction(repr(float(x))):
         return Exact(Fraction(x))
     raise InexactError(f"{x!r} is not known exactly")

@@ -57,8 +57,10 @@ def multiply(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, ...]:
     """Return the product of two polynomials, coefficients ascending: floats, or exact numbers."""
     out: list[Any] = [0.0] * (len(a) + len(b) - 1)
     for i, x in enumerate(a):
-        for j, y in enumerate(b):
-            out[i + j] += x * y
+        if x:
+            for j, y in enumerate(b):
+                if y:
+                    out[i + j] = out[i + j] + x * y if out[i + j] else x * y
     return tuple(out)
 
 

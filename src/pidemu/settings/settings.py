@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.card.load import Card, Variant
 from pidemu.card.model.card_file import Equation, Setting
@@ -18,6 +18,9 @@ from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonica
 if TYPE_CHECKING:
     from pidemu.algorithm.model import Algorithm
     from pidemu.law.law import Law
+
+
+_ROLES: Final = {role.value: role for role in Role}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,7 @@ class Value:
     @property
     def role(self) -> Role:
         """What the dial sets."""
-        return Role(self.setting.sets)
+        return _ROLES[self.setting.sets]
 
     @property
     def off(self) -> bool:

@@ -99,7 +99,7 @@ def textbook(pair: Pair) -> Found:
 
 def textbook_numbers(pair: Pair) -> Numbers:
     """Return the numbers that the rule in manuals gives; raises as `textbook`."""
-    check_terms(pair.wanted, pair.target)
+    check_terms(pair.wanted, pair.target.variant)
     return book.textbook(pair.wanted, pair.dial_kd, pair.target)
 
 

@@ -60,7 +60,7 @@ class Solver:
         NoMatchError, SettingError
             The target has no such settings.
         """
-        check_terms(self.pair.wanted, self.pair.target)
+        check_terms(self.pair.wanted, self.pair.target.variant)
         match aim.match:
             case None:
                 return self._default()

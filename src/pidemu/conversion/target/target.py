@@ -74,10 +74,7 @@ class Target:
 
     def dial(self, role: Role) -> tuple[str, Setting] | None:
         """Return the active dial that sets `role`."""
-        for name, setting in self.variant.equation.settings.items():
-            if setting.sets == role.value and name in self.variant.active:
-                return name, setting
-        return None
+        return self.variant.dials.get(role.value)
 
     def is_free(self, name: str, setting: Setting) -> bool:
         """Whether the conversion may choose a dial."""
@@ -88,20 +85,20 @@ class Target:
         dial = self.dial(role)
         return dial is not None and self.is_free(*dial)
 
-    @cached_property
+    @property
     def has_proportional(self) -> bool:
         """Whether there is a proportional term on the measurement."""
-        return self.variant.equation.proportional.on != "none"
+        return self.variant.has_proportional
 
-    @cached_property
+    @property
     def has_integral(self) -> bool:
         """Whether there is an integral term."""
-        return self.variant.equation.integral.on != "none" and self.dial(Role.INTEGRAL) is not None
+        return self.variant.has_integral
 
-    @cached_property
+    @property
     def has_derivative(self) -> bool:
         """Whether there is a derivative term."""
-        return self.variant.equation.derivative.on != "none" and self.dial(Role.DERIVATIVE) is not None
+        return self.variant.has_derivative
 
     @property
     def percent_per_unit(self) -> float:
