@@ -10,7 +10,16 @@ import pytest
 
 import pidemu
 from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
-from pidemu.certificate.models import Band, Certificate, Kick, NonlinearDifference, PathComparison, ScanByScan, ScanCost
+from pidemu.certificate.models import (
+    Band,
+    Certificate,
+    EmulationFigures,
+    Kick,
+    NonlinearDifference,
+    PathComparison,
+    ScanByScan,
+    ScanCost,
+)
 from pidemu.certificate.sentence import sentence
 
 EXACT = "The new controller does what the old one did, for disturbances and for setpoint changes."
@@ -36,8 +45,15 @@ def certificate(
     **more: Any,
 ) -> Certificate:
     at_scan = {name: more.pop(name, None) for name in ("feedback_at_scan", "setpoint_at_scan", "setpoint_kick_at_scan")}
+    ran = EmulationFigures(**{name: more.pop(name) for name in ("scan_by_scan", "nonlinear") if name in more})
     return Certificate(
-        feedback=feedback or path(), setpoint=setpoint or path(), setpoint_kick=Kick(*kick), time_scale=10.0, **at_scan, **more
+        feedback=feedback or path(),
+        setpoint=setpoint or path(),
+        setpoint_kick=Kick(*kick),
+        time_scale=10.0,
+        emulation=ran,
+        **at_scan,
+        **more,
     )
 
 

@@ -161,6 +161,7 @@ def _band(w: Floats, found: Differences, fine: Floats | None = None, finer: Diff
     return Band(float(w[0]), float(w[-1]), deviation, gain, phase, at)
 
 
+@lru_cache(maxsize=64)
 def compare_paths(source: Law, target: Law, limits: Limits, factor: float) -> tuple[PathComparison, PathComparison]:
     """Compare feedback and setpoint path of two laws over loop band and full band.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
 from pidemu.analysis.loop_figures import LoopComparison
 from pidemu.formatting import json_safe
@@ -177,6 +177,40 @@ class NonlinearDifference:
         return self.aspect in ("arithmetic", "error", "output", "setpoint")
 
 
+class Emulation(Protocol):
+    """What running both controllers shows; it may be run only when somebody asks."""
+
+    @property
+    def scan_by_scan(self) -> ScanByScan | None:
+        """Both run on the same signals, in their linear range; ``None`` where they cannot be, see `not_emulated`."""
+
+    @property
+    def not_emulated(self) -> str:
+        """Why they could not be run; empty where they could."""
+
+    @property
+    def nonlinear(self) -> tuple[NonlinearDifference, ...]:
+        """What differs beyond the linear law."""
+
+    @property
+    def inside_limits(self) -> tuple[NonlinearDifference, ...]:
+        """What of that shows in automatic with the output inside its limits: it counts for the verdict."""
+
+
+@dataclass(frozen=True, slots=True)
+class EmulationFigures:
+    """What running both controllers has shown; for the attributes see `Emulation`."""
+
+    scan_by_scan: ScanByScan | None = None
+    not_emulated: str = ""
+    nonlinear: tuple[NonlinearDifference, ...] = ()
+
+    @property
+    def inside_limits(self) -> tuple[NonlinearDifference, ...]:
+        """What shows in automatic with the output inside its limits."""
+        return tuple(d for d in self.nonlinear if d.inside_limits)
+
+
 TooSlow = Literal["", "source", "target", "both"]
 
 COARSE: Final = 1e-3
@@ -241,14 +275,10 @@ class Certificate:
         Whether a limit leaves the two apart for good, as nothing integrates and the target forgets where it was.
     proof : Proof or None
         Both laws compared without rounding, where they agree as far as floats can tell.
-    scan_by_scan : ScanByScan or None
-        Both controllers emulated; ``None`` where they cannot be, see `not_emulated`.
-    not_emulated : str
-        Why they could not be emulated.
+    emulation : Emulation
+        What running both controllers shows.
     scan_cost : ScanCost or None
         What different scan intervals cost, where they were given.
-    nonlinear : tuple of NonlinearDifference
-        What differs beyond the linear law.
     loop : LoopComparison or None
         The closed loop before and after, where a process was given.
     dials : tuple of Rounded
@@ -269,14 +299,27 @@ class Certificate:
     compensated: bool = False
     shifts_for_good: bool = False
     proof: Proof | None = None
-    scan_by_scan: ScanByScan | None = None
-    not_emulated: str = ""
+    emulation: Emulation = EmulationFigures()
     scan_cost: ScanCost | None = None
-    nonlinear: tuple[NonlinearDifference, ...] = ()
     loop: LoopComparison | None = None
     dials: tuple[Rounded, ...] = ()
     feedback_before_rounding: PathComparison | None = None
     setpoint_before_rounding: PathComparison | None = None
+
+    @property
+    def scan_by_scan(self) -> ScanByScan | None:
+        """Both controllers emulated; ``None`` where they cannot be, see `not_emulated`."""
+        return self.emulation.scan_by_scan
+
+    @property
+    def not_emulated(self) -> str:
+        """Why they could not be emulated."""
+        return self.emulation.not_emulated
+
+    @property
+    def nonlinear(self) -> tuple[NonlinearDifference, ...]:
+        """What differs beyond the linear law."""
+        return self.emulation.nonlinear
 
     @property
     def headline(self) -> PathComparison:
@@ -299,7 +342,13 @@ class Certificate:
     @property
     def is_bent(self) -> bool:
         """Whether something beyond the law differs that signals inside the limits show: a deadband, a rate limit, arithmetic."""
-        return not {d.aspect for d in self.nonlinear}.isdisjoint(("error", "output", "arithmetic"))
+        return any(d.aspect in ("error", "output", "arithmetic") for d in self.emulation.inside_limits)
+
+    @property
+    def _is_contradicted(self) -> bool:
+        """Whether two that compute alike have other outputs, though their laws are the same."""
+        run = self.scan_by_scan
+        return run is not None and run.same_rules and not run.is_exact_on_measurement
 
     @property
     def verdict(self) -> Verdict:
@@ -314,12 +363,9 @@ class Certificate:
 
     def verdict_in(self, mode: Literal["auto", "cascade"]) -> Verdict:
         """Return the verdict in one mode; they differ only where `setpoint_in_cascade` is stated."""
-        emulated = self.scan_by_scan
-        contradicted = emulated is not None and emulated.same_rules and not emulated.is_exact_on_measurement
         slow = self.scan_cost is not None and self.scan_cost.matters and not self.compensated
         coarse = self.rounding is not None and self.rounding > COARSE
-        moved = self.is_bent or contradicted or slow or coarse or self.shifts_for_good
-        if moved or not self.feedback_is_exact:
+        if slow or coarse or self.shifts_for_good or not self.feedback_is_exact or self.is_bent or self._is_contradicted:
             return "approximate"
         same = self.setpoint_is_exact_in(mode) and not self.setpoint_is_limited
         return "exact" if same else "exact-feedback"
@@ -327,7 +373,7 @@ class Certificate:
     @property
     def setpoint_is_limited(self) -> bool:
         """Whether one of the two limits the rate of the setpoint otherwise than the other one."""
-        return any(d.aspect == "setpoint" and d.figures for d in self.nonlinear)  # without figures it is about manual
+        return any(d.aspect == "setpoint" and d.figures for d in self.emulation.inside_limits)  # without figures it is about manual
 
     @property
     def feedback_is_exact(self) -> bool:
@@ -348,7 +394,9 @@ class Certificate:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON; what is infinite becomes the string ``"inf"``."""
-        plain: dict[str, Any] = json_safe(asdict(replace(self, proof=None)))
+        shown = EmulationFigures(self.scan_by_scan, self.not_emulated, self.nonlinear)
+        plain: dict[str, Any] = json_safe(asdict(replace(self, proof=None, emulation=shown)))
+        plain |= plain.pop("emulation")
         plain["proof"] = None if self.proof is None else self.proof.to_dict()
         for name in ("setpoint_kick", "setpoint_kick_at_scan", "kick_in_cascade"):
             kick: Kick | None = getattr(self, name)

@@ -80,12 +80,26 @@ def nonlinear_differences(
         *_emulated(both, trial),
         *_bias(*both),
         *limit_differences(*both, stated=limits is not None),
-        *arithmetic_differences(*both),
-        *error_differences(*both),
-        *output_differences(*both),
-        *setpoint_differences(*both, in_cascade=in_cascade),
+        *_inside_limits(both, in_cascade=in_cascade),
     ]
     return tuple(found)
+
+
+def differences_inside_limits(
+    source: Settings, target: Settings, scans: tuple[float, float], *, in_cascade: bool = False
+) -> tuple[NonlinearDifference, ...]:
+    """Return what of `nonlinear_differences` shows in automatic with the output inside its limits; arguments as there.
+
+    Only the arithmetic has to be emulated for it, and that only where it is not double precision on both sides.
+    """
+    return tuple(_inside_limits(scaled_controllers(source, target, scans), in_cascade=in_cascade))
+
+
+def _inside_limits(both: tuple[ScaledController, ScaledController], *, in_cascade: bool) -> Iterator[NonlinearDifference]:
+    yield from arithmetic_differences(*both)
+    yield from error_differences(*both)
+    yield from output_differences(*both)
+    yield from setpoint_differences(*both, in_cascade=in_cascade)
 
 
 def _emulated(both: tuple[ScaledController, ScaledController], trial: TrialPlan) -> Iterator[NonlinearDifference]:
