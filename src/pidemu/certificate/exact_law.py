@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal, TypeVar, cast
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.algorithm.resolve import Reader, algorithm_as_read
@@ -21,6 +21,7 @@ from pidemu.units import Spans, parse_unit, to_canonical, to_canonical_exactly
 
 Polynomial = tuple[Exact, ...]
 PathName = Literal["feedback", "setpoint", "setpoint in cascade"]
+X = TypeVar("X", Exact, float)
 _ZERO: Final = Exact(0)
 
 
@@ -209,7 +210,7 @@ def exact_paths(a: Algorithm[Exact], names: Sequence[PathName], factor: Exact | 
     return {name: ExactLaw.of([x * factor for x in trimmed(path.num)], path.den) for name, path in made.items()}
 
 
-def _quotients(a: Algorithm[Exact], names: Sequence[PathName]) -> dict[PathName, Rational]:
+def _quotients(a: Algorithm[Any], names: Sequence[PathName]) -> dict[PathName, Rational]:
     """Return paths as their terms make them, not in lowest terms."""
     feedback, setpoint = laws.paths(a, laws.CONTINUOUS)
     found: dict[PathName, Rational] = {"feedback": feedback, "setpoint": setpoint, "setpoint in cascade": setpoint}
@@ -233,24 +234,39 @@ def difference(source: Algorithm[Exact], target: Algorithm[Exact], name: PathNam
     factor : Exact
         What the source is multiplied by.
     """
-    products = []
-    for one, other in ((source, target), (_sizes(source), _sizes(target))):
-        a, b = (_quotients(x, (name,))[name] for x in (one, other))
-        times = factor if one is source else abs(factor)
-        products += [multiply([x * times for x in trimmed(a.num)], b.den), multiply(b.num, a.den)]
-    left, right, *sizes = products
-    largest = Fraction(0)
+    left, right = _cross_products(source, target, name, factor)
+    sizes = _cross_products(_sizes(source), _sizes(target), name, abs(float(factor)))
+    largest = 0.0
     for k, x in enumerate(add(left, [-y for y in right])):
-        size = max((exact(part[k]).near for part in sizes if k < len(part)), default=Fraction(0))
-        largest = max(largest, abs(exact(x).near) / size if size else Fraction(0))
-    return float(largest)
+        size = max((float(part[k]) for part in sizes if k < len(part)), default=0.0)
+        largest = max(largest, abs(float(exact(x))) / size if size else 0.0)
+    return largest
 
 
-def _sizes(a: Algorithm[Exact]) -> Algorithm[Exact]:
+def _cross_products(source: Algorithm[X], target: Algorithm[X], name: PathName, factor: X) -> tuple[Sequence[X], Sequence[X]]:
+    """Return numerator times the other's denominator, of the source multiplied by a factor and of the target."""
+    a, b = (_quotients(x, (name,))[name] for x in (source, target))
+    return multiply([x * factor for x in a.num], b.den), multiply(b.num, a.den)
+
+
+def _sizes(a: Algorithm[Exact]) -> Algorithm[float]:
     """Return an algorithm whose law is the sum of the sizes of all terms."""
-    a = replace(a, kp=abs(a.kp), ki=abs(a.ki), kd=abs(a.kd), c=abs(a.c))
-    return replace(a, b=_size_of_weight(a, a.b), cascade_b=None if a.cascade_b is None else _size_of_weight(a, a.cascade_b))
+    ki, kd, c, Tf = (abs(float(x)) for x in (a.ki, a.kd, a.c, a.Tf))
+    found = cast(Algorithm[float], replace(a, kp=abs(float(a.kp)), ki=ki, kd=kd, c=c, Tf=Tf))  # type: ignore[arg-type]
+    parts = {name: replace(part, filter=_sized(part.filter)) for name, part in _filtered(found).items()}
+    cascade = None if a.cascade_b is None else _size_of_weight(a, a.cascade_b)
+    return replace(found, b=_size_of_weight(a, a.b), cascade_b=cascade, **parts)
 
 
-def _size_of_weight(a: Algorithm[Exact], b: Any) -> Any:
-    return 1 + abs(b - 1) if a.series and a.c else abs(b)  # the series form takes P on the error, and adds what b is beyond 1
+def _filtered(a: Algorithm[float]) -> dict[str, Any]:
+    """Return the parts whose signals may be filtered, by name."""
+    return {"setpoint": a.setpoint, "measurement": a.measurement, "error": a.error}
+
+
+def _sized(lag: SignalFilter[Any] | None) -> SignalFilter[float] | None:
+    return None if lag is None else SignalFilter(time=float(lag.seconds))
+
+
+def _size_of_weight(a: Algorithm[Exact], b: Any) -> float:
+    """Return the size of a weight; the series form takes P on the error, and adds what b is beyond 1."""
+    return 1 + abs(float(b) - 1) if a.series and a.c else abs(float(b))

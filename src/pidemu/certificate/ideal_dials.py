@@ -49,13 +49,15 @@ class Dials:
     ----------
     settings : Settings
         The target's settings as they stand.
+    algorithm : Algorithm[Exact]
+        Their algorithm.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, algorithm: Algorithm[Exact]) -> None:
         self.settings = settings
         self.spans = exact_spans(settings)
         self.standing = ExactReader(settings, self.spans)
-        self.algorithm = exact_algorithm(settings)
+        self.algorithm = algorithm
         self.parallel = settings.equation.form is Form.PARALLEL
         self.by_gain = not self.parallel and settings.equation.proportional.on != "none"
         filt = settings.equation.derivative.filter

@@ -262,7 +262,7 @@ def _proposals(
     source: _Exactly, standing: _Exactly, residuals: Mapping[PathName, float]
 ) -> Iterator[tuple[dict[str, Exact], float]]:
     """Yield exact dials for the feedback path, each also with the weights that the setpoint paths need, and what floats leave."""
-    solver = Dials(standing.settings)
+    solver = Dials(standing.settings, standing.algorithm)
     for dials in [{}] if residuals["feedback"] == 0 else solver.feedback(source.laws["feedback"]):
         if dials:
             yield dials, residuals["feedback"]

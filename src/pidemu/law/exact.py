@@ -52,27 +52,39 @@ class Exact:
     (3 + sqrt(5))/2
     """
 
-    __slots__ = ("a", "b", "d")
+    __slots__ = ("d", "p", "q", "r")  # the number is (p + r sqrt(d))/q, in lowest terms
 
     def __init__(self, a: Fraction | int | str, b: Fraction | int | str = 0, d: int = 0) -> None:
-        self.a, self.b = Fraction(a), Fraction(b)
-        self.d = d if self.b else 0
+        x, y = Fraction(a), Fraction(b)
+        self.q = math.lcm(x.denominator, y.denominator)
+        self.p, self.r = x.numerator * (self.q // x.denominator), y.numerator * (self.q // y.denominator)
+        self.d = d if self.r else 0
 
-    def _both(self, other: Exact | Fraction | float) -> tuple[Exact, int]:
-        """Return the other number, and what the root of both is taken of."""
-        o = other if type(other) is Exact else exact(other)
+    @property
+    def a(self) -> Fraction:
+        """The rational part."""
+        return Fraction(self.p, self.q)
+
+    @property
+    def b(self) -> Fraction:
+        """What the root is multiplied by."""
+        return Fraction(self.r, self.q)
+
+    def _root_with(self, o: Exact) -> int:
+        """Return what the root of both numbers is taken of."""
         if self.d and o.d and self.d != o.d:
             raise InexactError(f"sqrt({self.d}) and sqrt({o.d}) have no common field of two dimensions")
-        return o, self.d or o.d
+        return self.d or o.d
 
     def __add__(self, other: object) -> Exact:
         if not isinstance(other, _NUMBERS):
             return NotImplemented
-        o, d = self._both(other)
-        return _made(self.a + o.a, self.b + o.b, d) if d else _made(self.a + o.a)
+        o = other if type(other) is Exact else exact(other)
+        d = self._root_with(o)
+        return _made(self.p * o.q + o.p * self.q, self.r * o.q + o.r * self.q, self.q * o.q, d)
 
     def __neg__(self) -> Exact:
-        return _made(-self.a, -self.b, self.d)
+        return _made(-self.p, -self.r, self.q, self.d)
 
     def __sub__(self, other: object) -> Exact:
         return self + -exact(other) if isinstance(other, _NUMBERS) else NotImplemented
@@ -83,19 +95,19 @@ class Exact:
     def __mul__(self, other: object) -> Exact:
         if not isinstance(other, _NUMBERS):
             return NotImplemented
-        o, d = self._both(other)
-        if not d:
-            return _made(self.a * o.a)
-        return _made(self.a * o.a + self.b * o.b * d, self.a * o.b + self.b * o.a, d)
+        o = other if type(other) is Exact else exact(other)
+        d = self._root_with(o)
+        return _made(self.p * o.p + self.r * o.r * d, self.p * o.r + self.r * o.p, self.q * o.q, d)
 
     def __truediv__(self, other: object) -> Exact:
         if not isinstance(other, _NUMBERS):
             return NotImplemented
-        o, d = self._both(other)
-        if not d:
-            return _made(self.a / o.a)
-        norm = o.a * o.a - o.b * o.b * d  # 0 for 0 only, as d is not a square
-        return self * _made(o.a / norm, -o.b / norm, d)
+        o = other if type(other) is Exact else exact(other)
+        d = self._root_with(o)
+        norm = o.p * o.p - o.r * o.r * d  # 0 for 0 only, as d is not a square
+        if not norm:
+            raise ZeroDivisionError(f"{self} divided by zero")
+        return self * _made(o.q * o.p, -o.q * o.r, norm, d)
 
     def __rtruediv__(self, other: Fraction | float) -> Exact:
         return exact(other) / self
@@ -109,7 +121,7 @@ class Exact:
         if not isinstance(other, _NUMBERS):
             return NotImplemented
         o = exact(other)
-        return (self.a, self.b, self.d) == (o.a, o.b, o.d)
+        return (self.p, self.r, self.q, self.d) == (o.p, o.r, o.q, o.d)
 
     def __lt__(self, other: object) -> bool:
         if isinstance(other, float) and math.isinf(other):
@@ -117,10 +129,10 @@ class Exact:
         return (self - other).sign < 0
 
     def __hash__(self) -> int:
-        return hash((self.a, self.b, self.d)) if self.b else hash(self.a)
+        return hash((self.p, self.r, self.q, self.d)) if self.r else hash(self.a)
 
     def __bool__(self) -> bool:
-        return bool(self.a or self.b)
+        return bool(self.p or self.r)
 
     def __abs__(self) -> Exact:
         return -self if self.sign < 0 else self
@@ -128,15 +140,13 @@ class Exact:
     @property
     def sign(self) -> int:
         """-1, 0 or 1."""
-        a, b = _sign(self.a), _sign(self.b)
-        return (a or b) if a * b >= 0 else a * _sign(self.a * self.a - self.b * self.b * self.d)
+        a, b = _sign(self.p), _sign(self.r)
+        return (a or b) if a * b >= 0 else a * _sign(self.p * self.p - self.r * self.r * self.d)
 
     @property
     def near(self) -> Fraction:
         """A fraction that agrees to dozens of digits."""
-        if not self.b:
-            return self.a
-        return self.a + self.b * _root(self.d)
+        return self.a + self.b * _root(self.d) if self.r else self.a
 
     def __float__(self) -> float:
         return float(self.near)
@@ -145,12 +155,11 @@ class Exact:
         return format(float(self), spec) if spec else str(self)
 
     def __repr__(self) -> str:
-        return f"Exact({self.a})" if not self.b else f"Exact({self.a}, {self.b}, {self.d})"
+        return f"Exact({self.a})" if not self.r else f"Exact({self.a}, {self.b}, {self.d})"
 
     def __str__(self) -> str:
         """The number as written by hand: a fraction, or a decimal where that is shorter; dots stand for digits left out."""
-        q = math.lcm(self.a.denominator, self.b.denominator)
-        p, r = int(self.a * q), int(self.b * q)
+        p, r, q = self.p, self.r, self.q
         if max(abs(p), abs(r), q, self.d) >= _LONG:
             return _decimal(self.near)
         if not r:
@@ -164,17 +173,18 @@ class Exact:
 _NUMBERS: Final = (Exact, Fraction, int, float)
 
 
-_NOTHING: Final = Fraction(0)
-
-
-def _made(a: Fraction, b: Fraction = _NOTHING, d: int = 0) -> Exact:
-    """Return a number from its parts, which are fractions already."""
+def _made(p: int, r: int, q: int, d: int) -> Exact:
+    """Return ``(p + r sqrt(d))/q`` in lowest terms."""
+    common = math.gcd(p, r, q)
+    if q < 0:
+        common = -common
     x = object.__new__(Exact)
-    x.a, x.b, x.d = a, b, d if b else 0
+    x.p, x.r, x.q = p // common, r // common, q // common
+    x.d = d if r else 0
     return x
 
 
-_SMALL: Final = {float(n): _made(Fraction(n)) for n in (-1, 0, 1, 2)}
+_SMALL: Final = {float(n): _made(n, 0, 1, 0) for n in (-1, 0, 1, 2)}
 """Whole numbers that equations are written with."""
 
 
@@ -185,7 +195,7 @@ def _root(d: int) -> Fraction:
     return Fraction(math.isqrt(d * scale * scale), scale)
 
 
-def _sign(x: Fraction) -> int:
+def _sign(x: int) -> int:
     return (x > 0) - (x < 0)
 
 
@@ -208,15 +218,17 @@ def exact(x: Any) -> Exact:
     """
     if isinstance(x, Exact):
         return x
-    if isinstance(x, Fraction | int):
+    if isinstance(x, float):
+        if x.is_integer():
+            return _SMALL.get(x) or _made(int(x), 0, 1, 0)
+        if math.isfinite(x) and Fraction(x) == Fraction(repr(float(x))):
+            return Exact(Fraction(x))
+    elif isinstance(x, Fraction | int):
         return Exact(x)
-    if isinstance(x, float) and x.is_integer():
-        return _SMALL.get(x) or _made(Fraction(int(x)))
-    if isinstance(x, float) and math.isfinite(x) and Fraction(x) == Fraction(repr(float(x))):
-        return Exact(Fraction(x))
     raise InexactError(f"{x!r} is not known exactly")
 
 
+@lru_cache(maxsize=4096)
 def as_typed(x: float) -> Exact:
     """Return the number that a float stands for: the decimal that was typed, or the simple fraction that it was computed as.
 
