@@ -28,6 +28,8 @@ _FINE: Final = 75
 """Frequencies of the grid over a band, and of the finer one around its largest difference."""
 _NONE: Final = 1e-12
 """Deviation on the grid that is rounding: nothing larger lies between."""
+_SURELY_ANOTHER: Final = 1e-6
+"""Deviation on the grid that no rounding makes."""
 _ROUNDING: Final = 1e-14
 """Part of a response's largest value that is rounding."""
 _NO_TIME: Final = 1e-9
@@ -186,6 +188,18 @@ def compare_paths(source: Law, target: Law, limits: Limits, factor: float) -> tu
         bands = [[_band(w[k], _part(found, path, k), fine[path, k], _part(finer, path, k)) for k in (0, 1)] for path in (0, 1)]
     feedback, setpoint = (_comparison(*both) for both in bands)
     return feedback, setpoint
+
+
+def sameness(source: Law, target: Law, limits: Limits, factor: float) -> tuple[float, float]:
+    """Return by how much feedback and setpoint path deviate over both bands, to tell the same law from another one.
+
+    What is below 1e-6 is exact; of what is more, the largest lies somewhere between the frequencies that were looked at. Arguments
+    as in `compare_paths`.
+    """
+    found = differences(factor * _on_grids(source, limits), _on_grids(target, limits))[0].max(axis=(1, 2))
+    if any(_NONE <= x < _SURELY_ANOTHER for x in found):
+        found = [path.full_band.max_deviation for path in compare_paths(source, target, limits, factor)]
+    return float(found[0]), float(found[1])
 
 
 @lru_cache(maxsize=64)

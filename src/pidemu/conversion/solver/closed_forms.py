@@ -59,7 +59,7 @@ def low_frequency_because(pair: Pair, why: Refusal) -> Found:
         if isinstance(why, NoMatchError) and why.fundamental:
             raise why from None
         raise refusal from None
-    if pair.certify(found.settings).feedback.is_exact:
+    if pair.verdict(found.settings) != "approximate":
         return replace(found, match="exact")
     return replace(found, why=str(why))
 
@@ -75,7 +75,7 @@ def exact(pair: Pair) -> Found:
     own = None
     with suppress(*REFUSALS):
         own = replace(own_numbers(pair, filtered=True), match="exact")
-    verdict = "approximate" if own is None else pair.certify(own.settings).verdict
+    verdict = "approximate" if own is None else pair.verdict(own.settings)
     if own is not None and verdict == "exact":
         return own
     try:
@@ -105,6 +105,6 @@ def textbook_numbers(pair: Pair) -> Numbers:
 
 def _proven(pair: Pair, found: Found) -> Found:
     """Refuse an exact match that is none: whatever the card says of its terms, the law decides."""
-    if pair.certify(found.settings).feedback.full_band.max_deviation > _ROUNDING:
+    if pair.sameness(found.settings)[0] > _ROUNDING:
         raise NoMatchError("no settings give the same law")
     return found

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.certificate.linear import certify
-from pidemu.certificate.models import RANK, Certificate
+from pidemu.certificate.linear import Limits, bands, deviation, sameness
+from pidemu.certificate.models import EXACT, RANK, Verdict
 from pidemu.conversion.match.no_match import NoMatchError
 from pidemu.conversion.match.weights import weights
 from pidemu.conversion.match_method import Match
@@ -71,13 +72,22 @@ class Pair:
         """Return the moments of the feedback path, which no mode changes."""
         return self.as_matched(Law(settings.algorithm())).moments()
 
-    def certify(self, settings: Settings) -> Certificate:
-        """Return the figures of both continuous laws, in this conversion's mode."""
-        return certify(self.law, law_in(settings, self.mode), None, self.factor)
+    def sameness(self, settings: Settings) -> tuple[float, float]:
+        """Return by how much both paths of the continuous laws deviate, in this conversion's mode; see `linear.sameness`."""
+        return sameness(self.law, law_in(settings, self.mode), self._bands, self.factor)
+
+    def verdict(self, settings: Settings) -> Verdict:
+        """Return the verdict by the continuous laws, in this conversion's mode."""
+        feedback, setpoint = self.sameness(settings)
+        return "approximate" if feedback >= EXACT else "exact" if setpoint < EXACT else "exact-feedback"
 
     def off(self, found: Found) -> float:
         """Return the largest deviation of the continuous feedback paths in the loop band."""
-        return self.certify(found.settings).feedback.loop_band.max_deviation
+        return deviation(self.law, law_in(found.settings, self.mode), self._bands[0], self.factor)
+
+    @cached_property
+    def _bands(self) -> Limits:
+        return bands(self.law, None)
 
     def settle(self, numbers: Numbers, match: Match, law: Law | None = None, scan: float | None = None) -> Found:
         """Return settings of the target, with the setpoint weights that keep the setpoint path, as far as their ranges allow.
@@ -130,7 +140,7 @@ class Pair:
             except SettingError as error:
                 refused = refused or error
                 continue
-            rank = RANK[self.certify(one.settings).verdict]
+            rank = RANK[self.verdict(one.settings)]
             if i == 0 or rank < RANK["approximate"]:
                 found.append((rank, one))
         if not found:

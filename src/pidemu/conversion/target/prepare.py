@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, Final
 
 from pidemu.card.load import Card, Variant
@@ -60,14 +61,28 @@ def prepare_target(
         A given dial is unknown, is what the conversion computes or is out of range; or a dial is neither computed nor given and
         has no default.
     """
-    variant = card.variant(options)
+    return _prepared(card.variant(options), tuple(options.items()), tuple(given.items()), ranges, pace, scan, source_lag, idle_gain)
+
+
+@lru_cache(maxsize=512)
+def _prepared(
+    variant: Variant,
+    options: tuple[tuple[str, object], ...],
+    given: tuple[tuple[str, object], ...],
+    ranges: tuple[SignalRange | None, SignalRange | None],
+    pace: float,
+    scan: float | None,
+    source_lag: float | None,
+    idle_gain: float,
+) -> Target:
+    """Return the target; many conversions to one card want the same."""
     spans = spans_of(*ranges, default_scan(variant.equation) if scan is None else scan)
     held, lag = dict(given), 0.0
     if source_lag is not None:
         held, lag = _with_a_measurement_filter(variant, held, source_lag, pace, spans)
     known = {n.casefold(): n for n in variant.equation.settings}
     target = Target(
-        card,
+        variant.card,
         variant,
         options=dict(options),
         given={known.get(n.casefold(), n): v for n, v in held.items()},
