@@ -116,6 +116,33 @@ def test_schemes_of_different_names_that_behave_alike_have_no_difference() -> No
     assert "windup" not in differences(conditional, other)
 
 
+def test_a_faster_way_back_inside_the_output_limits_is_told_and_the_verdict_is_not_exact() -> None:
+    """DeltaV's limits of anti-reset windup at 60 %: an output of 100 % falls by 34 % more than PROVOX's when the error turns."""
+    source = settings("emerson/deltav", GAIN=1, RESET=1, ARW_HI_LIM=60, FORM="Standard")
+    found = pidemu.convert(source, "fisher/provox", scan=1.0)
+    assert found.verdict == "approximate"
+    assert found.sentence.startswith("The two equations are the same; what differs is how fast the integral comes back.")
+    assert differences(source, found.settings)["integral"].text == (
+        "The integral comes back differently inside the output limits: that of emerson/deltav comes back 16 times as fast while "
+        "the output is above 60 %; that of fisher/provox comes back as it went."
+    )
+    outputs = []
+    for s in (source, found.settings):
+        controller = pidemu.Controller(s, 1.0, output_limits=(0, 100))
+        controller.rest(50.0, 50.0, 50.0)
+        pv = np.repeat([50.0, 30.0, 50.0, 52.0, 50.0], (5, 15, 10, 10, 20))
+        outputs.append(float(controller.run(np.full_like(pv, 50.0), pv)[-1]))
+    assert outputs[1] - outputs[0] > 30
+
+
+@pytest.mark.parametrize(("limits", "told"), [((0, 60), False), ((0, 61), True)])
+def test_a_faster_way_back_at_the_output_limits_themselves_does_nothing(limits: tuple[float, float], told: bool) -> None:
+    source = settings("emerson/deltav", GAIN=1, RESET=1, ARW_HI_LIM=60)
+    found = pidemu.convert(source, "fisher/provox", scan=1.0, limits=limits)
+    assert ("integral" in {d.aspect for d in found.certificate.nonlinear}) == told
+    assert found.verdict == ("approximate" if told else "exact")
+
+
 def test_noise_and_derivative_at_a_limit_show_what_steps_do_not() -> None:
     """A velocity controller drifts off the limit: what noise adds is kept, what it takes away is cut off at the limit."""
     source = settings("generic/standard", K=2, Ti=60, Td=8, Tf=1)

@@ -123,6 +123,15 @@ def _error_words(side: ScaledController) -> str:
     return f"{text}{where}{' and ' + still if still else ''}"
 
 
+def integral_differences(source: ScaledController, target: ScaledController, limits: Pair) -> Iterator[NonlinearDifference]:
+    """Yield what a windup scheme does with the output inside its limits [% of the output span], such as a faster way back."""
+    own = [side.settings.algorithm().integral.windup.inside_limits(*limits) if side.integrates else "" for side in (source, target)]
+    if own[0] != own[1]:
+        each = zip((source, target), own, strict=True)
+        words = "; ".join(f"that of {side.name} {did or 'comes back as it went'}" for side, did in each)
+        yield NonlinearDifference("integral", f"The integral comes back differently inside the output limits: {words}.", {})
+
+
 def output_differences(source: ScaledController, target: ScaledController) -> Iterator[NonlinearDifference]:
     """Yield rate limit, deadband and step of the output where they differ."""
     yield from _numbers(

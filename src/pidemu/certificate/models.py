@@ -153,13 +153,17 @@ class ScanByScan:
         return self.on_measurement <= EXACT * max(100.0, self.size)
 
 
+_BENT: Final = ("arithmetic", "error", "integral", "output")
+"""Aspects that signals inside the limits show."""
+
+
 @dataclass(frozen=True, slots=True)
 class NonlinearDifference:
     """What two controllers do differently beyond the linear law (point 5 of the certificate).
 
     Attributes
     ----------
-    aspect : {"windup", "transfer", "bias", "limits", "arithmetic", "error", "output", "setpoint"}
+    aspect : {"windup", "transfer", "bias", "limits", "arithmetic", "error", "integral", "output", "setpoint"}
         What it is about.
     text : str
         The difference in a sentence or two, with its numbers.
@@ -174,7 +178,7 @@ class NonlinearDifference:
     @property
     def inside_limits(self) -> bool:
         """Whether it shows in automatic with the output inside its limits; the others show at limits and transfers only."""
-        return self.aspect in ("arithmetic", "error", "output", "setpoint")
+        return self.aspect in (*_BENT, "setpoint")
 
 
 class Emulation(Protocol):
@@ -342,7 +346,7 @@ class Certificate:
     @property
     def is_bent(self) -> bool:
         """Whether something beyond the law differs that signals inside the limits show: a deadband, a rate limit, arithmetic."""
-        return any(d.aspect in ("error", "output", "arithmetic") for d in self.emulation.inside_limits)
+        return any(d.aspect in _BENT for d in self.emulation.inside_limits)
 
     @property
     def _is_contradicted(self) -> bool:

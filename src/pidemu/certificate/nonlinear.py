@@ -6,7 +6,13 @@ from collections.abc import Iterator
 from typing import Final
 
 from pidemu.certificate.arithmetic import arithmetic_differences
-from pidemu.certificate.differences import error_differences, limit_differences, output_differences, setpoint_differences
+from pidemu.certificate.differences import (
+    error_differences,
+    integral_differences,
+    limit_differences,
+    output_differences,
+    setpoint_differences,
+)
 from pidemu.certificate.limit_test import output_number, unknown_windup, windup_differences
 from pidemu.certificate.models import NonlinearDifference
 from pidemu.certificate.scaled_controller import ScaledController, scaled_controllers
@@ -62,7 +68,7 @@ def nonlinear_differences(
     Returns
     -------
     tuple of NonlinearDifference
-        By aspect: windup, transfer, bias, limits, arithmetic, error, output, setpoint.
+        By aspect: windup, transfer, bias, limits, arithmetic, error, integral, output, setpoint.
 
     Examples
     --------
@@ -75,29 +81,41 @@ def nonlinear_differences(
     (0.0, -4.04)
     """
     both = scaled_controllers(source, target, scans)
-    trial = planned(both, time_and_size, limits_in_percent(source, None) if limits is None else limits)
+    trial = planned(both, time_and_size, _limits(source, limits))
     found = [
         *_emulated(both, trial),
         *_bias(*both),
         *limit_differences(*both, stated=limits is not None),
-        *_inside_limits(both, in_cascade=in_cascade),
+        *_inside_limits(both, trial.limits, in_cascade=in_cascade),
     ]
     return tuple(found)
 
 
 def differences_inside_limits(
-    source: Settings, target: Settings, scans: tuple[float, float], *, in_cascade: bool = False
+    source: Settings,
+    target: Settings,
+    scans: tuple[float, float],
+    *,
+    limits: tuple[float, float] | None = None,
+    in_cascade: bool = False,
 ) -> tuple[NonlinearDifference, ...]:
     """Return what of `nonlinear_differences` shows in automatic with the output inside its limits; arguments as there.
 
     Only the arithmetic has to be emulated for it, and that only where it is not double precision on both sides.
     """
-    return tuple(_inside_limits(scaled_controllers(source, target, scans), in_cascade=in_cascade))
+    return tuple(_inside_limits(scaled_controllers(source, target, scans), _limits(source, limits), in_cascade=in_cascade))
 
 
-def _inside_limits(both: tuple[ScaledController, ScaledController], *, in_cascade: bool) -> Iterator[NonlinearDifference]:
+def _limits(source: Settings, stated: tuple[float, float] | None) -> tuple[float, float]:
+    return limits_in_percent(source, None) if stated is None else stated
+
+
+def _inside_limits(
+    both: tuple[ScaledController, ScaledController], limits: tuple[float, float], *, in_cascade: bool
+) -> Iterator[NonlinearDifference]:
     yield from arithmetic_differences(*both)
     yield from error_differences(*both)
+    yield from integral_differences(*both, limits)
     yield from output_differences(*both)
     yield from setpoint_differences(*both, in_cascade=in_cascade)
 

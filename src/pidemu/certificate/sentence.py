@@ -78,6 +78,7 @@ def _what_differs(c: Certificate) -> str:
 
 _PARTS: Final = {
     "error": "what is done to the error",
+    "integral": "how fast the integral comes back",
     "output": "what is done to the output",
     "arithmetic": "the arithmetic they are computed with",
 }

@@ -103,7 +103,8 @@ class EmulationOnDemand:
         run = self.scan_by_scan
         if run is None:
             return ()
-        return differences_inside_limits(self.judge.source, self.settings, run.scan, in_cascade=self.judge.mode == "cascade")
+        cascade = self.judge.mode == "cascade"
+        return differences_inside_limits(self.judge.source, self.settings, run.scan, limits=self.limits, in_cascade=cascade)
 
     @cached_property
     def _run(self) -> ScanByScan | str:

@@ -84,3 +84,12 @@ class WindupExternalReset(Scheme[R]):
         if low == -math.inf and high == math.inf:
             return WindupExternalReset(scheme=self.scheme)
         return WindupExternalReset(scheme=self.scheme, fast_return=FastReturn(factor=f.factor, low=low, high=high))
+
+    def inside_limits(self: WindupExternalReset[float], low: float, high: float) -> str:
+        """Return that it comes back faster from beyond limits of its own, where these lie inside those of the output [%]."""
+        f = self.fast_return
+        if f is None or (f.low <= low and f.high >= high):
+            return ""
+        beyond = [f"above {f.high:g} %"] if f.high < high else []
+        beyond += [f"below {f.low:g} %"] if f.low > low else []
+        return f"comes back {f.factor:g} times as fast while the output is {' or '.join(beyond)}"

@@ -106,6 +106,10 @@ class Scheme(Part, Generic[R]):
         """Tell whether two controllers with these schemes do the same at a limit, their integral times being the same."""
         return self == other
 
+    def inside_limits(self: Scheme[float], low: float, high: float) -> str:
+        """Return what it does with the output inside its limits [%], as a sentence goes on; most do nothing there."""
+        return ""
+
     def too_coarse(self, h: float) -> str | None:
         """Return what a scan interval `h` [s] is too long for, if anything."""
         return None
