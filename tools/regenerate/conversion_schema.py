@@ -7,12 +7,13 @@ reads back, stand here.
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any, Final, Literal
+from dataclasses import make_dataclass
+from typing import Annotated, Any, Final, Literal, get_type_hints
 
 from pydantic import Field, RootModel, TypeAdapter
 
 from pidemu.certificate import models
-from pidemu.certificate.models import Certificate
+from pidemu.certificate.models import Certificate, EmulationFigures
 from pidemu.certificate.proof import Proof
 from pidemu.conversion.document import SCHEMA
 from pidemu.conversion.questions import Kind
@@ -80,9 +81,7 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of what ``pidemu convert --json`` prints."""
     plain: dict[str, Any] = Outcome.model_json_schema(by_alias=True, mode="serialization")
     definitions: dict[str, Any] = plain.pop("$defs")
-    certificate = TypeAdapter(Certificate)
-    certificate.rebuild(_types_namespace={**vars(models), "Proof": Proof})
-    figures = certificate.json_schema(mode="serialization")
+    figures = TypeAdapter(_printed_certificate()).json_schema(mode="serialization")
     definitions |= {**figures.pop("$defs"), _CERTIFICATE: figures}
     definitions["Number"] = {"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf", "nan"]}]}
     for name in (*figures_of(figures, definitions), _CERTIFICATE):
@@ -100,6 +99,14 @@ def schema() -> dict[str, Any]:
         {**head, **{k: v for k, v in plain.items() if k != "title"}, "$defs": definitions}, SCHEMA
     )
     return found
+
+
+def _printed_certificate() -> type[Any]:
+    """Return the certificate as it is printed: what the emulation has shown stands among its own figures."""
+    known = {**vars(models), "Proof": Proof}
+    own, shown = (get_type_hints(part, known) for part in (Certificate, EmulationFigures))
+    del own["emulation"]
+    return make_dataclass(_CERTIFICATE, list((own | shown).items()), namespace={"__doc__": Certificate.__doc__})
 
 
 def figures_of(figures: dict[str, Any], definitions: dict[str, Any]) -> set[str]:

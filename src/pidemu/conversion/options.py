@@ -88,7 +88,7 @@ def _rank(merit: Merit) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
-class Choice:
+class OptionChoice:
     """One choice of the options.
 
     Attributes
@@ -120,7 +120,7 @@ class Ranking(Sequence[Attempt]):
 
     Parameters
     ----------
-    choices : iterable of Choice
+    choices : iterable of OptionChoice
         The choices that a conversion can tell apart, in the order in which equally good ones come.
     attempt : callable
         From a choice to what it gives.
@@ -128,12 +128,12 @@ class Ranking(Sequence[Attempt]):
         Whether dials depend on scan rules, so that choices with the same continuous law do not have the same dials.
     """
 
-    def __init__(self, choices: Iterable[Choice], attempt: Callable[[Choice], Attempt], *, rules_matter: bool) -> None:
+    def __init__(self, choices: Iterable[OptionChoice], attempt: Callable[[OptionChoice], Attempt], *, rules_matter: bool) -> None:
         self._attempt = attempt
         self._rules_matter = rules_matter
         self._ranked: list[Attempt] = []
         self._by_law: dict[str, Merit] = {}
-        self._left: list[tuple[tuple[float, ...], int, Choice, Attempt | None]] = [
+        self._left: list[tuple[tuple[float, ...], int, OptionChoice, Attempt | None]] = [
             (self._bound(choice), place, choice, None) for place, choice in enumerate(choices)
         ]
         heapq.heapify(self._left)
@@ -168,14 +168,14 @@ class Ranking(Sequence[Attempt]):
                 least = attempt.rank
             heapq.heappush(self._left, (least, place, choice, attempt))
 
-    def _bound(self, choice: Choice) -> tuple[float, ...]:
+    def _bound(self, choice: OptionChoice) -> tuple[float, ...]:
         """Return what a choice ranks by at best, by all that is known of it."""
         if choice.is_hopeless:
             return _REFUSED
         like = None if self._rules_matter else self._by_law.get(law_text(choice.variant))
         return _rank(choice.floor if like is None else with_same_law(choice.floor, like))
 
-    def _try(self, choice: Choice) -> Attempt:
+    def _try(self, choice: OptionChoice) -> Attempt:
         attempt = self._attempt(choice)
         if attempt.merit is not None and not self._rules_matter:
             self._by_law.setdefault(law_text(choice.variant), attempt.merit)
@@ -211,7 +211,7 @@ def ranking(
     rules_matter : bool
         Whether dials depend on scan rules.
     """
-    choices: list[Choice] = []
+    choices: list[OptionChoice] = []
     seen: list[tuple[object, ...]] = []
     for changed in _choices(card, taken):
         options = {**card.variant({}).chosen, **taken, **changed}
@@ -220,7 +220,7 @@ def ranking(
         if matters not in seen:
             seen.append(matters)
             least = floor(source, variant, len(changed), unused(variant, wanted))
-            choices.append(Choice(variant, options, changed, least, bool(missing_term(source.algorithm(), variant))))
+            choices.append(OptionChoice(variant, options, changed, least, bool(missing_term(source.algorithm(), variant))))
     return Ranking(choices, lambda choice: _attempt(choice, solver, aim), rules_matter=rules_matter)
 
 
@@ -255,7 +255,7 @@ def _dials(e: Equation) -> dict[str, tuple[object, ...]]:
     return {n: (s.sets, s.unit, s.range, s.off, s.default) for n, s in e.settings.items() if is_computed(e, n, Role(s.sets))}
 
 
-def _attempt(choice: Choice, solver: Callable[[Mapping[str, object]], Solver], aim: Aim) -> Attempt:
+def _attempt(choice: OptionChoice, solver: Callable[[Mapping[str, object]], Solver], aim: Aim) -> Attempt:
     work = None
     try:
         work = solver(choice.options)

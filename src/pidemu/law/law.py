@@ -257,9 +257,9 @@ def discrete_operators(a: Algorithm, h: float) -> Operators:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Law:
-    """The linear law of a controller, reverse acting. Two laws are one where they are one object.
+    """The linear law of a controller, reverse acting.
 
     Attributes
     ----------
@@ -276,6 +276,10 @@ class Law:
 
     algorithm: Algorithm
     scan: float | None = None
+
+    def __hash__(self) -> int:
+        a = self.algorithm
+        return hash((a.kp, a.ki, a.kd, a.Tf, a.b, a.c, self.scan))
 
     def __post_init__(self) -> None:
         if self.scan is not None:
