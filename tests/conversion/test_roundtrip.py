@@ -141,3 +141,12 @@ def test_what_a_conversion_wrote_reads_back_as_the_same_law(card: str, data: st.
     written: dict[str, object] = {**s.options, **{n: f"{v.value!r} {v.unit}" for n, v in s.items() if v.active and not v.off}}
     written |= {n: v.value for n, v in s.items() if v.active and v.off}
     assert s.card.settings(written).law() == s.law()
+
+
+def test_a_weight_of_zero_that_comes_back_as_zero_is_exact_though_arithmetic_without_rounding_has_a_trace_of_it() -> None:
+    s = pidemu.load_card("emerson/deltav").settings(FORM="Series", STRUCTURE="7", GAIN=2.5, RESET=3, RATE=1, BETA=0)
+    there = pidemu.convert(s, "generic/parallel", mode="auto")
+    back = pidemu.convert(there.settings, "emerson/deltav", options=s.options, mode="auto")
+    assert (there.verdict, back.verdict, back.settings["BETA"].value) == ("exact", "exact", 0.0)
+    assert back.proof is not None
+    assert float(back.proof.dials["BETA"].removesuffix("...")) != 0

@@ -22,9 +22,10 @@ from pidemu.errors import PidemuError
 from pidemu.formatting import json_safe
 from pidemu.law.exact import Exact, as_typed
 from pidemu.settings.settings import Settings
-from pidemu.units import Dimension, parse_unit
+from pidemu.units import Dimension, Role, parse_unit
 
 Mode = Literal["auto", "cascade", "both"]
+_WEIGHTS: Final = (Role.PROPORTIONAL_WEIGHT, Role.DERIVATIVE_WEIGHT)
 
 ROUNDING: Final = 1e-13
 """Relative difference of a dial from an exact one that is the rounding of some hundred operations in double."""
@@ -273,10 +274,11 @@ def _proposals(
 
 
 def _is_near(target: Settings, dials: Mapping[str, Exact], tolerance: float) -> bool:
-    """Whether the floats are the exact dials, rounded."""
+    """Whether the floats are the exact dials, rounded; a setpoint weight is a part of 1, of which 0 is the rounding too."""
     for name, x in dials.items():
         stands = Fraction(target[name].value)
-        if abs(x.near - stands) > tolerance * abs(stands):
+        size = max(abs(stands), 1) if target[name].role in _WEIGHTS else abs(stands)
+        if abs(x.near - stands) > tolerance * size:
             return False
     return True
 
