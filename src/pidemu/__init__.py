@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pidemu.controller.signals import Event
     from pidemu.conversion.ambiguity.readings import Reading, readings
     from pidemu.conversion.convert import convert
+    from pidemu.conversion.many import ConversionTable, convert_many
     from pidemu.conversion.questions import Answer, Question
     from pidemu.conversion.refused import ConversionRefusedError, QuestionError
     from pidemu.conversion.result import Conversion
@@ -64,6 +65,8 @@ _HOMES = {
     "compare": "records.compare",
     "Conversion": "conversion.result",
     "convert": "conversion.convert",
+    "ConversionTable": "conversion.many",
+    "convert_many": "conversion.many",
     "Verification": "conversion.verify",
     "verify": "conversion.verify",
     "Answer": "conversion.questions",

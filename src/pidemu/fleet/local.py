@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import queue
 import threading
 from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -16,6 +15,7 @@ from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block
 from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared, reason_of
+from pidemu.processes import processors
 from pidemu.program.ir import Structure
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
@@ -37,11 +37,6 @@ _LOOK: Final = 0.5
 """Seconds after which a wait begins anew: where the system does not interrupt one, Ctrl-C is seen then."""
 
 
-def cores_here() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def outcomes(
     loops: Iterable[tuple[int, Loop]], plan: FleetPlan, *, cores: int | None = None, room: Room | None = None
 ) -> Generator[BlockOutcome | Failed]:
@@ -60,7 +55,7 @@ def outcomes(
     room : callable, optional
         From a shape to the array that takes a block's signals; by default they are not kept.
     """
-    count = cores or cores_here()
+    count = cores or processors()
     threads = _Threads(count, plan, room)
     try:
         source = iter(loops)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 from pidemu.matrix.cell import Cell, Work, cell, failed
+from pidemu.processes import processors, shared
 
 _SHARE: Final = 4
 """Conversions that a process does before it reports. Some shares are begun ahead, and after Ctrl-C these still have to end."""
@@ -37,31 +35,16 @@ def computed(
     """
     shares = [tuple(pairs[i : i + _SHARE]) for i in range(0, len(pairs), _SHARE)]
     if jobs is None:
-        jobs = 1 if len(pairs) < _FEW else os.cpu_count() or 1
+        jobs = 1 if len(pairs) < _FEW else processors()
     found: dict[tuple[str, str], Cell] = {}
-    for cells in _shared(work, shares, jobs) if jobs > 1 else (_share(work, share) for share in shares):
+    for share, cells in shared(partial(_share, work), shares, jobs):
+        if isinstance(cells, BaseException):  # what a process that died was doing has failed
+            cells = [failed(*pair, cells) for pair in share]
         found.update({(c.source, c.target): c for c in cells})
         if progress is not None:
             progress(len(found), len(pairs))
     return found
 
 
-def _shared(work: Work, shares: Sequence[Pairs], jobs: int) -> Iterator[list[Cell]]:
-    """Yield the cells of each share as it gets done; what a process that died was doing has failed."""
-    # "spawn" everywhere: the same on every system, and safe beside threads
-    pool = ProcessPoolExecutor(min(jobs, len(shares)), mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent)
-    try:
-        running: dict[Future[list[Cell]], Pairs] = {pool.submit(_share, work, share): share for share in shares}
-        for done in as_completed(running):
-            error = done.exception()
-            yield done.result() if error is None else [failed(*pair, error) for pair in running[done]]
-    finally:
-        pool.shutdown(cancel_futures=True)  # after Ctrl-C, what has begun ends and the rest is dropped
-
-
 def _share(work: Work, pairs: Pairs) -> list[Cell]:
     return [cell(work, *pair) for pair in pairs]
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
