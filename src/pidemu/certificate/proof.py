@@ -277,7 +277,7 @@ def _is_near(target: Settings, dials: Mapping[str, Exact], tolerance: float) -> 
     """Whether the floats are the exact dials, rounded; a setpoint weight is a part of 1, of which 0 is the rounding too."""
     for name, x in dials.items():
         stands = Fraction(target[name].value)
-        size = max(abs(stands), 1) if target[name].role in _WEIGHTS else abs(stands)
+        size = max(abs(stands), Fraction(1)) if target[name].role in _WEIGHTS else abs(stands)
         if abs(x.near - stands) > tolerance * size:
             return False
     return True

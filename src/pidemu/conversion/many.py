@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -101,8 +101,8 @@ class ConversionTable(Sequence[Conversion]):
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Arrays over all conversions, shape (n,).
 
-        ``outcome``, ``verdict``, ``match`` and ``reason`` (str); ``feedback``, ``gain``, ``phase`` and ``setpoint`` (see `FIGURES`);
-        then every dial of the target that is in use anywhere [the card's units], NaN where it is not; then its options (str).
+        ``outcome``, ``verdict``, ``match``, ``reason`` (str); ``feedback``, ``gain``, ``phase``, ``setpoint`` (see `FIGURES`); then
+        every dial of the target that is in use anywhere [the card's units], NaN where it is not; and its options (str).
         """
         dials = list(dict.fromkeys(name for row in self.rows for name in row.dials))
         texts = {name: np.array([getattr(row, name) for row in self.rows], dtype=object) for name in _TEXTS}
@@ -124,7 +124,7 @@ _TEXTS: Final = ("outcome", "verdict", "match", "reason")
 
 
 def convert_many(
-    sources: Sequence[Settings] | Mapping[str, Sequence[object]],
+    sources: Sequence[Settings] | Mapping[str, Collection[Any]],
     target: str | Path | Card,
     *,
     source: str | Path | Card | None = None,
@@ -189,7 +189,7 @@ def convert_many(
     return ConversionTable(read, card, how, tuple(rows[i] for i in places))
 
 
-def _read(columns: Mapping[str, Sequence[object]], source: str | Path | Card | None) -> list[Settings | PidemuError]:
+def _read(columns: Mapping[str, Collection[Any]], source: str | Path | Card | None) -> list[Settings | PidemuError]:
     """Return the settings of each row of columns, or what is wrong with them."""
     if source is None:
         raise SettingError('columns are settings of a card; name it, such as source="fisher/provox"')

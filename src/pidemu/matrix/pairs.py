@@ -37,9 +37,8 @@ def computed(
     if jobs is None:
         jobs = 1 if len(pairs) < _FEW else processors()
     found: dict[tuple[str, str], Cell] = {}
-    for share, cells in shared(partial(_share, work), shares, jobs):
-        if isinstance(cells, BaseException):  # what a process that died was doing has failed
-            cells = [failed(*pair, cells) for pair in share]
+    for share, done in shared(partial(_share, work), shares, jobs):
+        cells = [failed(*pair, done) for pair in share] if isinstance(done, BaseException) else done
         found.update({(c.source, c.target): c for c in cells})
         if progress is not None:
             progress(len(found), len(pairs))
