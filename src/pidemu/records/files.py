@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.errors import RecordError, suggest
 from pidemu.excerpt import quoted, visible
+from pidemu.files.columns import AT_ONCE, RowsOfText, plain_numbers, rows_of, write_longer
 from pidemu.files.reading import Kind, read_text
 from pidemu.files.tables import counted, split_lines, split_row, write_rows
 from pidemu.plausible import plain_number
@@ -61,7 +62,7 @@ class Record:
         Time since the last scan [s], NaN where empty: nominal.
     header : tuple of str
         Column names of the file.
-    rows : tuple of tuple of str
+    rows : sequence of tuple of str
         Its cells, as they stand, without blanks around.
     names : mapping
         The file's own name of a column, by the names above.
@@ -88,7 +89,7 @@ class Record:
     hold: Floats | None = None
     interval: Floats | None = None
     header: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
+    rows: Sequence[tuple[str, ...]] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
     skipped: str = ""
@@ -138,22 +139,19 @@ def read_record(path: str | Path, needed: Sequence[str] = ("sp", "pv")) -> Recor
         raise RecordError(f"{shown}: no samples; a record has a header line such as {','.join(needed)} and one line per scan")
     if lines.contradiction:
         raise RecordError(f"{shown}:{lines.rows[0][0]}: {lines.contradiction}")
-    table = [(i, _row(f"{shown}:{i}", line, lines.delimiter)) for i, line in lines.rows]
-    header = table[0][1]
-    places = _places(shown, table[0][0], header, needed)
-    for i, row in table[1:]:
-        if len(row) != len(header):
-            remark = "; comments stand above the header" if row[0].startswith("#") else ""
-            raise RecordError(f"{shown}:{i}: {counted(len(row), 'cell')}, the header has {len(header)}{remark}")
-    columns: dict[str, Floats] = {}
-    for name, at in places.items():
-        cells = [(f"{shown}:{i}: column {header[at]}", row[at].strip()) for i, row in table[1:]]
-        columns[name] = _times(cells) if name == "time" else np.array([_cell(*cell, name) for cell in cells])
+    numbers, texts = zip(*lines.rows, strict=True)
+    header = _row(f"{shown}:{numbers[0]}", texts[0], lines.delimiter)
+    places = _places(shown, numbers[0], header, needed)
+    read = _Columns(shown, header, places)
+    for start in range(1, len(texts), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        read.add(numbers[part], texts[part], lines.delimiter)
+    columns = read.columns()
     for name in ("sp", "pv"):
-        columns.setdefault(name, np.full(len(table) - 1, math.nan))
+        columns.setdefault(name, np.full(len(texts) - 1, math.nan))
     return Record(
         header=tuple(header),
-        rows=tuple(tuple(row) for _, row in table[1:]),
+        rows=RowsOfText(texts[1:], lines.delimiter),
         names={name: header[at] for name, at in places.items()},
         comments=lines.comments,
         skipped=lines.skipped,
@@ -161,6 +159,71 @@ def read_record(path: str | Path, needed: Sequence[str] = ("sp", "pv")) -> Recor
         said=lines.said,
         **columns,
     )
+
+
+class _Columns:
+    """The columns of a record, read some rows at a time.
+
+    Parameters
+    ----------
+    path : str
+        The file, for messages.
+    header : list of str
+        The names of its columns.
+    places : mapping of str to int
+        Which of them are what.
+    """
+
+    def __init__(self, path: str, header: list[str], places: Mapping[str, int]) -> None:
+        self._path, self._header, self._places = path, header, places
+        self._parts: dict[str, list[Floats]] = {name: [] for name in places}
+        self._first: float | datetime | None = None
+
+    def add(self, numbers: Sequence[int], texts: Sequence[str], delimiter: str) -> None:
+        """Read rows, with their lines in the file."""
+        rows = self._rows(numbers, texts, delimiter)
+        cells = list(zip(*rows, strict=True))
+        for name, at in self._places.items():
+            self._parts[name].append(self._column(name, at, cells[at], numbers))
+
+    def columns(self) -> dict[str, Floats]:
+        """Return what was read, by name."""
+        return {name: np.concatenate(parts) for name, parts in self._parts.items()}
+
+    def _rows(self, numbers: Sequence[int], texts: Sequence[str], delimiter: str) -> list[list[str]]:
+        try:
+            rows = rows_of(texts, delimiter)
+        except ValueError:  # once more, to find out which
+            rows = [_row(f"{self._path}:{i}", text, delimiter) for i, text in zip(numbers, texts, strict=True)]
+        for i, row in zip(numbers, rows, strict=True):
+            if len(row) != len(self._header):
+                remark = "; comments stand above the header" if row[0].startswith("#") else ""
+                raise RecordError(f"{self._path}:{i}: {counted(len(row), 'cell')}, the header has {len(self._header)}{remark}")
+        return rows
+
+    def _column(self, name: str, at: int, cells: Sequence[str], numbers: Sequence[int]) -> Floats:
+        """Return a column's numbers: all at once where they are plain, else cell by cell."""
+        found = None if name in ("auto", "hold") or isinstance(self._first, datetime) else plain_numbers(cells)
+        if found is not None:
+            if name == "time" and self._first is None:
+                self._first = float(found[0])
+            return found
+        known: dict[str, float] = {}
+        for i, cell in zip(numbers, cells, strict=True):
+            if cell not in known:
+                where, text = f"{self._path}:{i}: column {self._header[at]}", cell.strip()
+                known[cell] = self._seconds(where, text) if name == "time" else _cell(where, text, name)
+        return np.array([known[cell] for cell in cells])
+
+    def _seconds(self, where: str, text: str) -> float:
+        """Return a time in seconds; that of a timestamp, such as 2026-11-22T08:00:05, since the first one."""
+        x = _time(where, text)
+        self._first = x if self._first is None else self._first
+        if isinstance(x, datetime) and isinstance(self._first, datetime):
+            return (x - self._first).total_seconds()
+        if isinstance(x, datetime) or isinstance(self._first, datetime):
+            raise RecordError(f"{where}: '{quoted(text)}' is not like the cells above; write seconds or timestamps throughout")
+        return x
 
 
 def _row(where: str, line: str, delimiter: str) -> list[str]:
@@ -216,21 +279,6 @@ def _yes_or_no(where: str, text: str, name: str) -> float:
     raise RecordError(f"{where}: '{quoted(text)}' is neither 1 ({meaning[0]}) nor 0 ({meaning[1]})")
 
 
-def _times(cells: Iterable[tuple[str, str]]) -> Floats:
-    """Return seconds: the cells are numbers of them, or timestamps such as 2026-11-22T08:00:05, then since the first one."""
-    found = [(where, text, _time(where, text)) for where, text in cells]
-    first = found[0][2]
-    out = []
-    for where, text, x in found:
-        if isinstance(x, datetime) and isinstance(first, datetime):
-            out.append((x - first).total_seconds())
-        elif isinstance(x, datetime) or isinstance(first, datetime):
-            raise RecordError(f"{where}: '{quoted(text)}' is not like the cells above; write seconds or timestamps throughout")
-        else:
-            out.append(x)
-    return np.array(out)
-
-
 def _time(where: str, text: str) -> float | datetime:
     with contextlib.suppress(ValueError):
         return plain_number(text)
@@ -242,7 +290,7 @@ def _time(where: str, text: str) -> float | datetime:
     return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)  # a clock change is no gap
 
 
-def write_record(record: Record, columns: Mapping[str, Iterable[float]], stream: TextIO) -> None:
+def write_record(record: Record, columns: Mapping[str, Sequence[float] | Floats], stream: TextIO) -> None:
     """Write a record with its comments and with more columns, its cells separated as they were.
 
     Parameters
@@ -255,6 +303,5 @@ def write_record(record: Record, columns: Mapping[str, Iterable[float]], stream:
         Where to.
     """
     stream.writelines(f"{line}\n" for line in ([record.said] if record.said else []) + [*record.comments])
-    rows = zip(record.rows, *columns.values(), strict=True)
     write_rows(stream, [[*record.header, *columns]], delimiter=record.delimiter)
-    write_rows(stream, ([*row, *(repr(float(value)) for value in values)] for row, *values in rows), delimiter=record.delimiter)
+    write_longer(stream, record.rows, list(columns.values()), record.delimiter)
