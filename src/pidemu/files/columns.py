@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Final, TextIO, overload
+from collections.abc import Sequence
+from functools import cache
+from typing import Final, TextIO, overload
 
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.files.tables import split_row, text_cell, write_rows
+from pidemu.files.tables import split_row, write_rows
 
 _PLAIN: Final = "0123456789.+-eE \t"
 """Characters of plain numbers: of these alone, Python reads the same numbers as `pidemu.plausible.plain_number`."""
@@ -49,10 +50,24 @@ class RowsOfText(Sequence[tuple[str, ...]]):
             return [tuple(row) for row in rows_of(self._lines[index], self._delimiter)]
         return tuple(split_row(self._lines[index], self._delimiter))
 
+    def plain_lines(self, part: slice) -> Sequence[str] | None:
+        """Return lines that `write_rows` would write as they stand; ``None`` where one of them has to be looked at by its cells."""
+        lines = self._lines[part]
+        return None if _to_be_looked_at(self._delimiter).search("\n".join(lines)) else lines
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and len(self) == len(other) and all(x == y for x, y in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]  # as of a list
+
+
+@cache
+def _to_be_looked_at(delimiter: str) -> re.Pattern[str]:
+    """Return what finds a cell that is not written as it stands: with blanks, marks, or signs in front of what is not a number."""
+    other = "" if delimiter == "\t" else "\t"
+    end = rf"(?:{delimiter}|$)"
+    number = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+    return re.compile(rf"[\"'\r =@\uff1d\uff0b\uff0d\uff20{other}]|(?:^|{delimiter})[+-](?!{number}{end})|^$", re.MULTILINE)
 
 
 def rows_of(lines: Sequence[str], delimiter: str) -> list[list[str]]:
@@ -107,19 +122,8 @@ def write_longer(
     for start in range(0, len(rows), AT_ONCE):
         part = slice(start, start + AT_ONCE)
         numbers = [map(repr, np.asarray(column[part], dtype=float).tolist()) for column in columns]
-        _write(stream, rows[part], numbers, delimiter)
-
-
-def _write(stream: TextIO, rows: Sequence[Sequence[str]], numbers: Iterable[Iterator[str]], delimiter: str) -> None:
-    longer: Iterable[Any] = zip(rows, *numbers, strict=True)
-    if rows and all(_is_as_it_stands(cells, delimiter) for cells in zip(*rows, strict=True)):
-        stream.writelines(f"{delimiter.join((*row, *more))}\n" for row, *more in longer)
-    else:
-        write_rows(stream, ([*row, *more] for row, *more in longer), delimiter=delimiter)
-
-
-def _is_as_it_stands(cells: Sequence[str], delimiter: str) -> bool:
-    """Whether cells are written as they are: numbers, or texts that mean nothing to the format nor to a spreadsheet."""
-    if plain_numbers(cells) is not None:
-        return True
-    return all(cell and text_cell(cell) == cell and not _SPECIAL.search(cell) and delimiter not in cell for cell in set(cells))
+        lines = rows.plain_lines(part) if isinstance(rows, RowsOfText) else None
+        if lines is not None:
+            stream.writelines(f"{delimiter.join(longer)}\n" for longer in zip(lines, *numbers, strict=True))
+        else:
+            write_rows(stream, ([*row, *more] for row, *more in zip(rows[part], *numbers, strict=True)), delimiter=delimiter)
