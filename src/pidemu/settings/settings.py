@@ -148,6 +148,10 @@ class Settings(Mapping[str, Value]):
     _algorithms: dict[tuple[bool, float | None], Algorithm] = field(default_factory=dict, init=False, repr=False, compare=False)
     _laws: dict[float | None, Law] = field(default_factory=dict, init=False, repr=False, compare=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process is sent: all but what is worked out from it."""
+        return {**self.__dict__, "_algorithms": {}, "_laws": {}}
+
     def __getitem__(self, name: str) -> Value:
         return self.values_by_name[name]
 
