@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
     from pidemu.simulation.simulate import Simulation, simulate
+    from pidemu.tuning.optimise import Optimum, optimise
     from pidemu.tuning.rules import TuningRule, tuning_rules
     from pidemu.tuning.tune import Tuning, tune
 
@@ -113,6 +114,8 @@ _HOMES = {
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
     "Tuning": "tuning.tune",
+    "Optimum": "tuning.optimise",
+    "optimise": "tuning.optimise",
     "tune": "tuning.tune",
     "TuningRule": "tuning.rules",
     "tuning_rules": "tuning.rules",
@@ -139,6 +142,7 @@ __all__ = [
     "Law",
     "Loop",
     "LoopTable",
+    "Optimum",
     "PidemuError",
     "Process",
     "ProcessError",
@@ -168,6 +172,7 @@ __all__ = [
     "fit_process",
     "half_rule",
     "load_card",
+    "optimise",
     "read_loops",
     "read_record",
     "readings",

@@ -17,7 +17,7 @@ from pidemu.plausible import plain_number
 NUMBERS = st.one_of(st.floats().map(repr), st.integers().map(str), st.text("0123456789.+-eE \t_,infa", max_size=8))
 CELLS = st.one_of(
     NUMBERS,
-    st.sampled_from(["", " ", "=1+1", "'=1", "-101-FIC", "+", "-", "@x", "a b", 'say "x"', "\uff1d1", "auto", "2026-11-22T08:00:05"]),
+    st.sampled_from(["", " ", "=1+1", "'=1", "-101-FIC", "+", "-", "@x", "a b", 'say "x"', "\uff1d1", "auto", "2026-11-22"]),
     st.text("abc=+-@'\"\t 12.", max_size=6),
 )
 
@@ -60,7 +60,9 @@ def test_longer_rows_are_written_as_row_by_row(lines: list[list[str]], delimiter
     values = [0.1 * i for i in range(len(texts))]
     together, alone = io.StringIO(), io.StringIO()
     write_longer(together, RowsOfText(texts, delimiter), [values, np.array(values)], delimiter)
-    write_rows(alone, ([*split_row(t, delimiter), repr(v), repr(v)] for t, v in zip(texts, values, strict=True)), delimiter=delimiter)
+    write_rows(
+        alone, ([*split_row(t, delimiter), repr(v), repr(v)] for t, v in zip(texts, values, strict=True)), delimiter=delimiter
+    )
     assert together.getvalue() == alone.getvalue()
 
 

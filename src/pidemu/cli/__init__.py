@@ -24,6 +24,7 @@ _COMMANDS: Final = {
     "simulate": "Run a card in a closed loop with a process.",
     "fit": "Fit a process to the record of a bump test.",
     "relay": "Put a relay in place of the controller, and read the oscillation.",
+    "optimise": "Find the best settings of a card for a process, within limits.",
     "tune": "Tune a card for a process, by a rule or by all of them.",
     "robustness": "How far gain and dead time may change: the robustness plot.",
     "bode": "A loop over frequency: Bode, Nyquist, gang of four.",
