@@ -295,6 +295,18 @@ def test_loops_that_changed_are_run_again_and_those_that_are_gone_are_dropped(tm
     assert sorted(signals_of(tmp_path / "f")) == sorted(parquet_of(tmp_path / "p.parquet")) == sorted(x.tag for x in after)
 
 
+def test_a_run_that_was_killed_before_its_second_place_held_anything_goes_on(tmp_path: Path, ran: list[str]) -> None:
+    """The folder lists its first block when it is written; the Parquet file may have nothing yet."""
+    where: dict[str, Any] = {"folder": tmp_path / "f", "parquet": tmp_path / "p.parquet"}
+    Fleet(alike(8)).simulate(**STEPS, **where)
+    where["parquet"].unlink()
+    ran.clear()
+    result = Fleet(alike(8)).simulate(**STEPS, **where, resume=True)
+    assert len(ran) == 8
+    check(result, Fleet(alike(8)).simulate(**STEPS, keep=True))
+    assert sorted(parquet_of(where["parquet"])) == sorted(loop.tag for loop in alike(8))
+
+
 def test_a_folder_of_another_fleet_is_refused_and_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Fleet(alike(8)).simulate(**STEPS, folder=tmp_path / "f", parquet=tmp_path / "p.parquet")
     before = {path.name: path.read_bytes() for path in (tmp_path / "f").iterdir()}

@@ -187,7 +187,7 @@ def test_the_command_prints_dials_limits_figures_and_rules() -> None:
         "largest sensitivity, at most 1.6",
         "The loop, at a scan every 0.5 s",
         "What rules would give",
-        "simc",
+        "amigo-pid",
     )
     assert all(part in text for part in parts)
 

@@ -78,9 +78,11 @@ class SignalStore:
         if damaged:
             more = f" and {len(damaged) - _FAULTS} more" if len(damaged) > _FAULTS else ""
             warn(f"{self._folder or self._parquet}: {', '.join(damaged[:_FAULTS])}{more}; the loops in it are run again")
-        elif not kept and ((self._folder and self._folder.listed) or (self._parquet and self._parquet.listed)):
+        both = ((self._folder, in_folder), (self._parquet, in_parquet))
+        others = [] if damaged else [place for place, found in both if place is not None and place.listed and not found]
+        if others:
             raise FleetError(
-                f"none of the loops in {self._folder or self._parquet} is one of this fleet as it is run now, with its settings, "
+                f"none of the loops in {others[0]} is one of this fleet as it is run now, with its settings, "
                 f"process, steps and this version of pidemu; give the place of the run that did not end, or an empty one"
             )
         if self._folder is not None and in_folder is not None:
