@@ -29,9 +29,10 @@ import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final
 
+from pidemu.columns.traced import each, is_traced, isinf, isnan, plain, sign_of
 from pidemu.errors import UnitError, suggest
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number
@@ -229,6 +230,10 @@ _PLAIN: Final = (Dimension.RATIO, Dimension.PERCENT)
 _INVERTED: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 
 
+_EXACT: Final = 2**53
+"""Whole numbers up to here are floats without rounding, so that one operation with them rounds once."""
+
+
 @cache
 def parse_unit(text: str) -> Unit:
     """Return the unit a person wrote: ``"rep/min"``, ``"minutes per repeat"``, ``"sec"``, ``"%"``.
@@ -406,18 +411,57 @@ def from_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> 
 
 def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
     check_unit(role, unit)
-    if math.isnan(value):
+    value = plain(value) + 0.0  # no negative zero
+    if isnan(value):
         raise UnitError("not a number (NaN)")
     inverted = is_reciprocal(role, unit)
-    if math.isinf(value):
-        return math.copysign(0.0 if inverted else math.inf, value)
+    if isinf(value):
+        return (0.0 if inverted else math.inf) * sign_of(value)
     if value == 0 and inverted:
         return math.inf
-    convert = _inward if inward else _outward
+    if unit.scans and is_traced(value, spans.scan):
+        found: float = each(lambda x, h: _convert(role, x, unit, replace(spans, scan=h), inward=inward), value, spans.scan)
+        return found
+    c = _constant(role, unit, spans)
+    return _over(c, value) if inverted else _times(c if inward else 1 / c, value)
+
+
+def _times(c: Fraction, x: float) -> float:
+    """Return a product, rounded once."""
+    if c == 1:
+        return x
+    if c.denominator == 1 and c <= _EXACT:
+        return x * float(c)
+    if c.numerator == 1 and c.denominator <= _EXACT:
+        return x / float(c.denominator)
+    product: float = each(partial(_product, c.numerator, c.denominator), x)
+    return product
+
+
+def _over(c: Fraction, x: float) -> float:
+    """Return a quotient, rounded once."""
+    if c.denominator == 1 and c <= _EXACT:
+        return float(c) / x
+    quotient: float = each(partial(_quotient, c.numerator, c.denominator), x)
+    return quotient
+
+
+def _product(numerator: int, denominator: int, x: float) -> float:
+    whole, parts = x.as_integer_ratio()
+    return _divided(numerator * whole, denominator * parts, x)
+
+
+def _quotient(numerator: int, denominator: int, x: float) -> float:
+    whole, parts = x.as_integer_ratio()
+    return _divided(numerator * parts, denominator * whole, x)
+
+
+def _divided(over: int, under: int, x: float) -> float:
+    """Return a quotient of whole numbers, which Python rounds once."""
     try:
-        return float(convert(role, Fraction(value), unit, spans))
+        return over / under
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.copysign(math.inf, x)
 
 
 def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = FULL) -> float:

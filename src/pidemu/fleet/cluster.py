@@ -197,7 +197,7 @@ def _light(one: BlockOutcome | Failed) -> BlockOutcome | Failed:
     """Return what is sent back: the trials and what came of them, without the programs' numbers."""
     if isinstance(one, Failed):
         return one
-    return replace(one, members=tuple(replace(m, structure=None, values=(), initial=()) for m in one.members))  # type: ignore[arg-type]
+    return replace(one, members=one.members.light())
 
 
 Taken = tuple[list[BlockOutcome | Failed], float]

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pidemu import __version__
 from pidemu.fleet.blocks import COLUMNS, BlockOutcome
-from pidemu.fleet.judgement import MARGINS, RAN, Judgement, judgement
+from pidemu.fleet.judgement import MARGINS, RAN, Judgement, judgements
 from pidemu.fleet.loops import FleetPlan, Loop
 
 FIELDS: Final = ("scan", "scans", "status", *COLUMNS, "settled", "stable", *MARGINS, "engine", "key")
@@ -78,14 +78,14 @@ def finished(outcome: BlockOutcome, known: Sequence[str]) -> list[Finished]:
     return [
         Finished(
             m.tag,
-            m.trial.scan,
-            m.trial.scans,
+            m.scan,
+            m.scans,
             {name: column[i] for name, column in columns.items()},
-            judgement(outcome, i),
+            judged,
             outcome.engine.engine,
             known[m.place],
         )
-        for i, m in enumerate(outcome.members)
+        for i, (m, judged) in enumerate(judgements(outcome))
     ]
 
 

@@ -16,13 +16,15 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial
 
 from pidemu.arrays import Floats
+from pidemu.columns.traced import is_traced, isfinite, value_of, whole
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Response
 from pidemu.process.roots import polynomial_of
@@ -119,7 +121,7 @@ def responses(gain: float, poles: Sequence[complex], zeros: Sequence[complex], h
     return np.asarray(gain * found * np.exp(-1j * w * h * scans), dtype=np.complex128)
 
 
-def _whole_scans(delays: Floats, h: float) -> tuple[Floats, Floats]:
+def _whole_scans(delays: Floats, h: float | Floats) -> tuple[Floats, Floats]:
     """Return the whole scans in dead times [s], and what is left of each."""
     scans = np.floor(delays / h + _WHOLE)
     fraction = delays - scans * h
@@ -173,18 +175,79 @@ def _weighted(weights: _Weights, values: Sequence[float]) -> float:
 
 def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], delay: float, h: float) -> SampledProcess:
     """Return the sampled model; see `pidemu.Process.sampled`."""
-    if not (math.isfinite(h) and h > 0):
+    if not (isfinite(h) and h > 0):
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
-    A, B = chain(poles)
+    if is_traced(gain, delay, h, *poles, *zeros):
+        return _traced(gain, poles, zeros, delay, h)
     row, through = outputs(poles, zeros)
-    whole_scans, fractions = _whole_scans(np.array([delay]), h)
-    scans, fraction = int(whole_scans[0]), float(fractions[0])
-    with np.errstate(over="ignore", invalid="ignore"):
-        (whole, after, _), (_, late, begun) = expm1(A, B, (h, h - fraction, fraction))
-        early = begun + after @ begun
-    if not all(np.isfinite(x).all() for x in (whole, late, early)):
+    (growth,), (early,), (late,), (scans,) = held(*chain(poles), np.array([delay]), np.array([h]))
+    if not all(np.isfinite(x).all() for x in (growth, late, early)):
         raise ProcessError(f"the process outgrows all numbers within one scan of {h:g} s; give a shorter scan interval")
-    return SampledProcess(h, whole, early, late, gain * row, gain * through, scans)
+    return SampledProcess(h, growth, early, late, gain * row, gain * through, int(scans))
+
+
+def held(A: Floats, B: Floats, delays: Floats, h: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return F, E, G and d of processes behind a hold.
+
+    Parameters
+    ----------
+    A, B : ndarray, shape (..., n, n) and (..., n)
+        States, as `chain` returns them; of each process, or of all.
+    delays, h : ndarray, shape (processes,)
+        Dead times and scan intervals [s].
+    """
+    scans, fractions = _whole_scans(delays, h)
+    with np.errstate(over="ignore", invalid="ignore"):
+        grown, moved = expm1(A, B, np.stack([h, h - fractions, fractions], axis=-1))
+        begun = moved[:, 2]
+        early = begun + (grown[:, 1] @ begun[..., None])[..., 0]
+    return grown[:, 0], early, moved[:, 1], scans
+
+
+def _traced(gain: Any, poles: Sequence[Any], zeros: Sequence[Any], delay: Any, h: Any) -> SampledProcess:
+    """Return the model of a process whose numbers are traced; its poles and zeros are real."""
+    n = len(poles)
+    numbers = (gain, delay, h, *poles, *zeros)
+    flat, fits = sampled_columns(n, *(np.array([float(value_of(x).real)]) for x in numbers))
+    if not fits[0]:
+        raise ProcessError("the process outgrows all numbers within one scan")
+    found = np.array(whole(partial(sampled_columns, n), numbers, flat[0].tolist()), dtype=object)
+    growth, early, late, row, (through, scans) = np.split(found, np.cumsum([n * n, n, n, n]))
+    return SampledProcess(h, growth.reshape(n, n), early, late, row, through, scans)
+
+
+def sampled_columns(n: int, gain: Floats, delay: Floats, h: Floats, *roots: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Return the sampled models of many processes with real poles, and which of them there are.
+
+    Parameters
+    ----------
+    n : int
+        How many of the roots are poles; the others are zeros.
+    gain, delay, h : ndarray, shape (processes,)
+        Gains [%/%], dead times and scan intervals [s].
+    *roots : ndarray, shape (processes,)
+        Poles and zeros [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (processes, n * n + 3 n + 2)
+        In a row each: F, E, G, c, D and d, as `SampledProcess` names them.
+    """
+    poles = np.array(roots[:n]).reshape(n, -1).T
+    poles = np.take_along_axis(poles, np.argsort(-np.abs(poles), axis=1, kind="stable"), axis=1)
+    drive = np.where(poles == 0, 1.0, -poles)
+    A, B = np.zeros((gain.size, n, n)), np.zeros((gain.size, n))
+    A[:, range(n), range(n)], A[:, range(1, n), range(n - 1)], B[:, :1] = poles, drive[:, 1:], drive[:, :1]
+    growth, early, late, scans = held(A, B, delay, h)
+    fits = np.isfinite(np.concatenate([growth.reshape(gain.size, -1), early, late], axis=1)).all(axis=1)
+    if len(roots) > n:
+        both = zip(poles.astype(complex).tolist(), np.transpose(roots[n:]).astype(complex).tolist(), strict=True)
+        found = [outputs(p, z) for p, z in both]
+        row, through = np.array([row for row, _ in found]), np.array([through for _, through in found])
+    else:  # the states are in a row, and the last one is what comes out
+        row, through = np.eye(n)[-1:] if n else np.zeros((1, 0)), np.array([0.0 if n else 1.0])
+    parts = (growth.reshape(gain.size, -1), early, late, gain[:, None] * row, (gain * through)[:, None], scans[:, None])
+    return np.concatenate(parts, axis=1), fits
 
 
 def _in_order(poles: Sequence[complex]) -> list[complex]:
@@ -227,18 +290,31 @@ def expm1(A: Floats, B: Floats, times: Sequence[float] | Floats) -> tuple[Floats
     """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B`` for several times, by series and doubling.
 
     ``F(2t) = 2 F(t) + F(t)^2``: nothing cancels in that, as it would in the squaring of ``exp(A t)``.
+
+    Parameters
+    ----------
+    A, B : ndarray, shape (..., n, n) and (..., n)
+        The system, or one after the other.
+    times : array_like, shape (..., m)
+        Times [s]; those of one system are computed with the same number of doublings.
     """
-    n = B.size
-    X = np.zeros((len(times), n + 1, n + 1))
+    n = B.shape[-1]
     t = np.array(times)
-    X[:, :n, :n], X[:, :n, n] = A * t[:, None, None], B * t[:, None]
-    size = float(np.abs(X).sum(axis=2).max())
-    doublings = max(0, math.ceil(math.log2(2 * size))) if size else 0
-    X /= 2.0**doublings
+    X = np.zeros((*t.shape, n + 1, n + 1))
+    X[..., :n, :n], X[..., :n, n] = A[..., None, :, :] * t[..., None, None], B[..., None, :] * t[..., None]
+    sizes = np.abs(X).sum(axis=-1).max(axis=(-2, -1))
+    doublings = np.array([_doublings(size) for size in sizes.ravel().tolist()], dtype=np.int64).reshape(sizes.shape)
+    X /= np.ldexp(1.0, doublings)[..., None, None, None]
     F = term = X
     for k in range(2, _TERMS):
         term = term @ X / k
         F = F + term
-    for _ in range(doublings):
-        F = 2 * F + F @ F
-    return F[:, :n, :n], F[:, :n, n]
+    for done in range(doublings.max(initial=0)):
+        left = doublings > done
+        F[left] = 2 * F[left] + F[left] @ F[left]
+    return F[..., :n, :n], F[..., :n, n]
+
+
+def _doublings(size: float) -> int:
+    """Return how often a step of the series is doubled, from the norm of the whole."""
+    return max(0, math.ceil(math.log2(2 * size))) if 0 < size < math.inf else 0

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats
+from pidemu.columns.traced import sign_of
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Rational, Response
 from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
@@ -147,6 +148,22 @@ class Process:
         pv, op = (given.span for given in ranges)
         return replace(self, gain=self.gain * op / pv, unit=PERCENT)
 
+    def with_numbers(self, gain: Any, delay: Any, roots: Sequence[Any]) -> Process:
+        """Return a process of this shape with other numbers, which are not checked: they are those of one that was.
+
+        Parameters
+        ----------
+        gain, delay : number
+            Gain and dead time.
+        roots : sequence of number
+            Poles, then zeros, as many as there are.
+        """
+        made, n = object.__new__(Process), len(self.poles)
+        numbers = {"gain": gain, "poles": tuple(roots[:n]), "zeros": tuple(roots[n:]), "delay": delay, "unit": self.unit}
+        for name, value in numbers.items():
+            object.__setattr__(made, name, value)
+        return made
+
     def rounded(self, digits: int = 6) -> Process:
         """Return the process with so many significant digits of gain, lags and leads, and dead time, as they are printed."""
 
@@ -231,7 +248,7 @@ class Process:
         needs a positive controller gain.
         """
         turned = sum(p.imag == 0 and p.real > 0 for p in self.poles)
-        return math.copysign(1.0, self.gain) * (-1.0) ** turned
+        return sign_of(self.gain) * (-1.0) ** turned
 
     @property
     def time(self) -> float:

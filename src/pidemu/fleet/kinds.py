@@ -1,0 +1,80 @@
+"""Kinds of loops: those of one kind differ in their numbers only."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from pidemu.fleet.loops import Loop
+
+_STATED: Final = ("scan", "setpoint", "load", "time", "output_limits", "initial")
+"""What a loop may state with a number or two, or leave to the fleet."""
+_EXACT: Final = 2**53
+"""Whole numbers below are the same as floats."""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """A loop as its kind and its numbers.
+
+    Attributes
+    ----------
+    kind : tuple
+        What is the same for all loops of the kind.
+    numbers : list of float
+        The values of the dials; gain, dead time, poles and zeros of the process; then what the loop states of scan interval, steps,
+        time, limits and start.
+    """
+
+    kind: tuple[Hashable, ...]
+    numbers: list[float]
+
+
+def numbered(loop: Loop) -> Numbered | None:
+    """Return kind and numbers of a loop, or ``None`` where it is of a kind of its own: with complex poles, or odd numbers."""
+    settings, process = loop.settings, loop.process
+    dials = settings.values_by_name.values()
+    numbers: list[Any] = [dial.value for dial in dials]
+    numbers += (process.gain, process.delay)
+    for root in (*process.poles, *process.zeros):
+        if root.imag:
+            return None
+        numbers.append(root.real)
+    stated: list[int | None] = []
+    for name in _STATED:
+        given = getattr(loop, name)
+        several = isinstance(given, tuple)
+        stated.append(None if given is None else len(given) if several else 0)
+        numbers += given if several else () if given is None else (given,)
+    if not all(type(x) is float or (type(x) is int and -_EXACT < x < _EXACT) for x in numbers):
+        return None
+    kind = (
+        id(settings.variant),  # which lives as long as its card
+        *(settings.pv_range, settings.op_range, settings.pace, settings.lag, settings.scan),
+        tuple((dial.name, dial.unit, dial.spans, dial.given, dial.active) for dial in dials),
+        *(len(process.poles), len(process.zeros), process.unit),
+        *stated,
+        loop.action,
+    )
+    return Numbered(kind, numbers)
+
+
+def with_numbers(loop: Loop, numbers: Sequence[Any]) -> Loop:
+    """Return a loop of the same kind with other numbers, in the order of `Numbered`; they may be traced."""
+    left = iter(numbers)
+    settings, process = loop.settings, loop.process
+    values = {name: replace(dial, value=next(left)) for name, dial in settings.items()}
+    gain, delay, *roots = (next(left) for _ in range(2 + len(process.poles) + len(process.zeros)))
+    return replace(
+        loop,
+        settings=replace(settings, values_by_name=values),
+        process=process.with_numbers(gain, delay, roots),
+        **{name: _stated(getattr(loop, name), left) for name in _STATED},
+    )
+
+
+def _stated(given: Any, left: Iterator[Any]) -> Any:
+    if given is None:
+        return None
+    return tuple(next(left) for _ in given) if isinstance(given, tuple) else next(left)

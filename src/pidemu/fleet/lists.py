@@ -1,0 +1,152 @@
+"""Lists of loops: those of a fleet, some of them, and those of one kind among them."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from pidemu.arrays import Floats
+from pidemu.errors import FleetError
+from pidemu.fleet.kinds import numbered
+from pidemu.fleet.loops import Loop
+
+
+class LoopList(Sequence[Loop]):
+    """The loops of a fleet, or some of them, in order.
+
+    Parameters
+    ----------
+    loops : iterable of Loop
+        The loops.
+    """
+
+    def __init__(self, loops: Iterable[Loop]) -> None:
+        self._loops = tuple(loops)
+
+    def __len__(self) -> int:
+        return len(self._loops)
+
+    @overload
+    def __getitem__(self, at: int) -> Loop: ...
+    @overload
+    def __getitem__(self, at: slice) -> LoopList: ...
+    def __getitem__(self, at: int | slice) -> Loop | LoopList:
+        return self.chosen(range(len(self))[at]) if isinstance(at, slice) else self._loops[at]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and len(self) == len(other) and all(map(operator.eq, self, other))
+
+    __hash__ = None  # type: ignore[assignment]  # of its loops, some may be written as they are asked for
+
+    def chosen(self, which: Sequence[int]) -> LoopList:
+        """Return some of the loops."""
+        return LoopList([self._loops[i] for i in which])
+
+    @property
+    def tags(self) -> Sequence[str]:
+        """The names of the loops."""
+        return [loop.tag for loop in self._loops]
+
+    @property
+    def cards(self) -> Sequence[str]:
+        """The ids of the loops' cards."""
+        return [loop.settings.card.id for loop in self._loops]
+
+    def by_kind(self) -> tuple[list[KindOfLoops], list[int]]:
+        """Return the loops by kind, and those that are of a kind of their own."""
+        found: dict[tuple[Hashable, ...], list[int]] = {}
+        numbers: dict[tuple[Hashable, ...], list[list[float]]] = {}
+        others = []
+        for i, loop in enumerate(self._loops):
+            one = numbered(loop)
+            if one is None:
+                others.append(i)
+            else:
+                found.setdefault(one.kind, []).append(i)
+                numbers.setdefault(one.kind, []).append(one.numbers)
+        return [KindOfLoops(kind, np.array(found[kind]), np.array(numbers[kind], dtype=np.float64).T) for kind in found], others
+
+
+@dataclass(frozen=True, slots=True)
+class KindOfLoops:
+    """Loops of a list that are of one kind.
+
+    Attributes
+    ----------
+    kind : tuple
+        The kind.
+    which : ndarray, shape (loops,)
+        Their numbers in the list.
+    numbers : ndarray, shape (numbers, loops)
+        Their numbers (`pidemu.fleet.kinds.Numbered`).
+    """
+
+    kind: tuple[Hashable, ...]
+    which: npt.NDArray[np.int64]
+    numbers: Floats
+
+    def __len__(self) -> int:
+        return len(self.which)
+
+    def chosen(self, which: npt.NDArray[Any]) -> KindOfLoops:
+        """Return some of the loops."""
+        return KindOfLoops(self.kind, self.which[which], self.numbers[:, which])
+
+
+class PlacedLoops(Sequence[tuple[int, Loop]]):
+    """Loops with their places in a fleet.
+
+    Parameters
+    ----------
+    loops : LoopList
+        The loops.
+    places : sequence of int
+        Their places.
+    """
+
+    def __init__(self, loops: LoopList, places: Sequence[int]) -> None:
+        self.loops, self.places = loops, places
+
+    @classmethod
+    def of(cls, pairs: Iterable[tuple[int, Loop]]) -> PlacedLoops:
+        """Return them from pairs of place and loop."""
+        if isinstance(pairs, PlacedLoops):
+            return pairs
+        both = list(pairs)
+        return cls(LoopList(loop for _, loop in both), [place for place, _ in both])
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @overload
+    def __getitem__(self, at: int) -> tuple[int, Loop]: ...
+    @overload
+    def __getitem__(self, at: slice) -> PlacedLoops: ...
+    def __getitem__(self, at: int | slice) -> tuple[int, Loop] | PlacedLoops:
+        if isinstance(at, slice):
+            return PlacedLoops(self.loops[at], self.places[at])
+        return self.places[at], self.loops[at]
+
+
+def unique(loops: Iterable[Loop]) -> LoopList:
+    """Return the loops as a list.
+
+    Raises
+    ------
+    FleetError
+        There are none, or two have the same tag.
+    """
+    found = loops if isinstance(loops, LoopList) else LoopList(loops)
+    if not found:
+        raise FleetError("a fleet has no loops; give at least one")
+    seen: set[str] = set()
+    for tag in found.tags:
+        if tag in seen:
+            raise FleetError(f"two loops have the tag '{tag}'; give each its own")
+        seen.add(tag)
+    return found
