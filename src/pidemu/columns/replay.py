@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats
-from pidemu.columns.traced import Constant, Each, Guard, Step, Tape, Traced, Whole
+from pidemu.columns.traced import Constant, Each, Guard, NotTracedError, Step, Tape, Traced, Whole, value_of
 
 Fits = npt.NDArray[np.bool_]
 """Which loops are of the structure."""
@@ -44,15 +44,22 @@ class Recording:
     results: tuple[int | Constant, ...]
 
     @classmethod
-    def of(cls, tape: Tape, results: Sequence[Any]) -> Recording:
+    def of(cls, tape: Tape, given: Sequence[float], results: Sequence[Any]) -> Recording:
         """Return what is on a tape, as far as results and decisions depend on it.
 
         Parameters
         ----------
         tape : Tape
             The tape; what is recorded later does not count.
+        given : sequence of float
+            The inputs.
         results : sequence
             Traced numbers, and plain ones.
+
+        Raises
+        ------
+        NotTracedError
+            What was recorded does not give the results back.
         """
         places = tuple(x.place if isinstance(x, Traced) else Constant(float(x)) for x in results)
         needed = {place for place in places if isinstance(place, int)}
@@ -61,7 +68,11 @@ class Recording:
             if place in needed:
                 needed.update(tape.steps[place][1])
         steps = tuple(step if place in needed or step[0] == "input" else None for place, step in enumerate(tape.steps))
-        return cls(steps, tuple(tape.guards), places)
+        recording = cls(steps, tuple(tape.guards), places)
+        found, fits = recording.replay(np.array([given], dtype=np.float64).T)
+        if not fits[0] or not np.array_equal(found[:, 0], [value_of(x) for x in results], equal_nan=True):
+            raise NotTracedError("what was recorded does not give back what it was recorded from")
+        return recording
 
     def replay(self, columns: Floats) -> tuple[Floats, Fits]:
         """Return the results for many loops, shape (results, loops), and which of these are of the structure.

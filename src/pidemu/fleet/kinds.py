@@ -6,6 +6,7 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from pidemu.columns.traced import Traced
 from pidemu.fleet.loops import Loop
 
 _STATED: Final = ("scan", "setpoint", "load", "time", "output_limits", "initial")
@@ -14,20 +15,24 @@ _EXACT: Final = 2**53
 """Whole numbers below are the same as floats."""
 
 
+Kind = tuple[Hashable, ...]
+"""What is the same for all loops of a kind."""
+
+
 @dataclass(frozen=True, slots=True)
 class Numbered:
     """A loop as its kind and its numbers.
 
     Attributes
     ----------
-    kind : tuple
-        What is the same for all loops of the kind.
+    kind : Kind
+        Its kind.
     numbers : list of float
         The values of the dials; gain, dead time, poles and zeros of the process; then what the loop states of scan interval, steps,
         time, limits and start.
     """
 
-    kind: tuple[Hashable, ...]
+    kind: Kind
     numbers: list[float]
 
 
@@ -47,10 +52,10 @@ def numbered(loop: Loop) -> Numbered | None:
         several = isinstance(given, tuple)
         stated.append(None if given is None else len(given) if several else 0)
         numbers += given if several else () if given is None else (given,)
-    if not all(type(x) is float or (type(x) is int and -_EXACT < x < _EXACT) for x in numbers):
+    if not all(type(x) is float or type(x) is Traced or (type(x) is int and -_EXACT < x < _EXACT) for x in numbers):
         return None
     kind = (
-        id(settings.variant),  # which lives as long as its card
+        settings.variant,
         *(settings.pv_range, settings.op_range, settings.pace, settings.lag, settings.scan),
         tuple((dial.name, dial.unit, dial.spans, dial.given, dial.active) for dial in dials),
         *(len(process.poles), len(process.zeros), process.unit),

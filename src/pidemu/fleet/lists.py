@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, overload
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import overload
 
 import numpy as np
-import numpy.typing as npt
 
-from pidemu.arrays import Floats
+from pidemu.columns.lots import Lot
 from pidemu.errors import FleetError
-from pidemu.fleet.kinds import numbered
+from pidemu.fleet.kinds import Kind, numbered
 from pidemu.fleet.loops import Loop
 
 
@@ -47,55 +46,34 @@ class LoopList(Sequence[Loop]):
         """Return some of the loops."""
         return LoopList([self._loops[i] for i in which])
 
-    @property
+    @cached_property
     def tags(self) -> Sequence[str]:
         """The names of the loops."""
         return [loop.tag for loop in self._loops]
 
-    @property
+    @cached_property
     def cards(self) -> Sequence[str]:
         """The ids of the loops' cards."""
         return [loop.settings.card.id for loop in self._loops]
 
-    def by_kind(self) -> tuple[list[KindOfLoops], list[int]]:
-        """Return the loops by kind, and those that are of a kind of their own."""
-        found: dict[tuple[Hashable, ...], list[int]] = {}
-        numbers: dict[tuple[Hashable, ...], list[list[float]]] = {}
+    def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
+        """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""
+        found: dict[Kind, tuple[list[int], list[list[float]]]] = {}
         others = []
         for i, loop in enumerate(self._loops):
             one = numbered(loop)
             if one is None:
                 others.append(i)
             else:
-                found.setdefault(one.kind, []).append(i)
-                numbers.setdefault(one.kind, []).append(one.numbers)
-        return [KindOfLoops(kind, np.array(found[kind]), np.array(numbers[kind], dtype=np.float64).T) for kind in found], others
+                which, numbers = found.setdefault(one.kind, ([], []))
+                which.append(i)
+                numbers.append(one.numbers)
+        return [(kind, lot_of(which, numbers)) for kind, (which, numbers) in found.items()], others
 
 
-@dataclass(frozen=True, slots=True)
-class KindOfLoops:
-    """Loops of a list that are of one kind.
-
-    Attributes
-    ----------
-    kind : tuple
-        The kind.
-    which : ndarray, shape (loops,)
-        Their numbers in the list.
-    numbers : ndarray, shape (numbers, loops)
-        Their numbers (`pidemu.fleet.kinds.Numbered`).
-    """
-
-    kind: tuple[Hashable, ...]
-    which: npt.NDArray[np.int64]
-    numbers: Floats
-
-    def __len__(self) -> int:
-        return len(self.which)
-
-    def chosen(self, which: npt.NDArray[Any]) -> KindOfLoops:
-        """Return some of the loops."""
-        return KindOfLoops(self.kind, self.which[which], self.numbers[:, which])
+def lot_of(which: Sequence[int], numbers: Sequence[Sequence[float]]) -> Lot:
+    """Return loops of one kind and their numbers as columns."""
+    return Lot(np.array(which), np.array(numbers, dtype=np.float64).T)
 
 
 class PlacedLoops(Sequence[tuple[int, Loop]]):

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import contextlib
 import gc
-from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 import numpy as np
 
+from pidemu.columns.lots import KindOfComputation, Lot
 from pidemu.errors import PidemuError
 from pidemu.fleet.group import Group
-from pidemu.fleet.lists import KindOfLoops, PlacedLoops
+from pidemu.fleet.lists import PlacedLoops
 from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.recorded import PreparedColumns, RecordedLoop, record
 from pidemu.program.ir import Structure
@@ -26,10 +27,6 @@ from pidemu.simulation.measured import measured
 from pidemu.simulation.outcome import last_answer, margins_if_any, stability_of
 from pidemu.simulation.trial import Trial
 
-_WORTH: Final = 4
-"""Recording a loop takes about three times as long as preparing it: as many loops of a kind are worth it."""
-_TRIES: Final = 6
-"""So many recordings that did for less than `_WORTH` loops, or failed, and the others of the kind are prepared one by one."""
 _SLICE: Final = 64
 """Loops that are prepared one by one from one look at what is done to the next."""
 
@@ -50,14 +47,6 @@ class Failed:
     reason: str
 
 
-@dataclass
-class _Known:
-    """What is known of a kind: its recordings, and how many of them were not worth it."""
-
-    recordings: list[RecordedLoop] = field(default_factory=list)
-    vain: int = 0
-
-
 class Preparation:
     """Prepares the loops of a run, and remembers how.
 
@@ -74,7 +63,7 @@ class Preparation:
 
     def __init__(self, plan: FleetPlan) -> None:
         self._plan = plan
-        self._kinds: dict[tuple[Hashable, ...], _Known] = {}
+        self._kinds: dict[Hashable, KindOfComputation[RecordedLoop]] = {}
         self.structures: dict[Structure, Structure] = {}
 
     def prepared(self, loops: PlacedLoops) -> Iterator[Group | Failed]:
@@ -82,58 +71,29 @@ class Preparation:
         left: list[int] = list(range(len(loops)))
         if not self._plan.margins:  # these take each loop by itself
             kinds, left = loops.loops.by_kind()
-            for kind in kinds:
-                groups, others = self._by_recording(loops, kind)
+            for kind, lot in kinds:
+                known = self._kinds.setdefault(kind, KindOfComputation())
+                done, others = known.compute(lot, self._record(loops))
                 left += others
-                yield from groups
+                yield from (self._group(loops, recorded, one) for recorded, one in done)
         left.sort()
         for start in range(0, len(left), _SLICE):
             with _no_collection():
                 found = [self._alone(loops, i) for i in left[start : start + _SLICE]]
             yield from found
 
-    def _by_recording(self, loops: PlacedLoops, kind: KindOfLoops) -> tuple[list[Group], list[int]]:
-        """Prepare loops of a kind; return them, and which are to be prepared one by one."""
-        known = self._kinds.setdefault(kind.kind, _Known())
-        groups: list[Group] = []
-        alone: list[int] = []
-        left = kind
-        for recording in known.recordings:
-            left = self._prepare(recording, loops, left, groups)
-        while len(left) >= _WORTH and known.vain < _TRIES:
-            first, count = int(left.which[0]), len(left)
-            try:
-                recording = record(loops.loops[first], left.numbers[:, 0].tolist(), self._plan)
-            except Exception:  # it cannot be run, or not be recorded; the single way will tell
-                known.vain += 1
-                alone.append(first)
-                left = left.chosen(np.arange(1, count))
-                continue
-            known.recordings.append(recording)
-            left = self._prepare(recording, loops, left, groups)
-            known.vain += count - len(left) < _WORTH
-        return groups, [*alone, *left.which.tolist()]
+    def _record(self, loops: PlacedLoops) -> Callable[[int, Sequence[float]], RecordedLoop]:
+        return lambda which, numbers: record(loops.loops[which], numbers, self._plan)
 
-    def _prepare(self, recording: RecordedLoop, loops: PlacedLoops, kind: KindOfLoops, groups: list[Group]) -> KindOfLoops:
-        """Prepare the loops of a kind that have a recording's structure; return the others."""
-        if not len(kind):
-            return kind
-        columns, fits = recording.prepare(kind.numbers)
-        if fits.any():
-            groups.append(self._group(loops, kind.which[fits].tolist(), recording.structure, columns.chosen(fits)))
-        return kind.chosen(~fits)
-
-    def _group(self, loops: PlacedLoops, which: Sequence[int], structure: Structure, columns: PreparedColumns) -> Group:
-        shared = self.structures.setdefault(structure, structure)
-        places, list_of = loops.places, loops.loops
-        tags, cards = list_of.tags, list_of.cards
+    def _group(self, loops: PlacedLoops, recorded: RecordedLoop, lot: Lot) -> Group:
+        which, all_of_them = lot.which.tolist(), loops.loops
         return Group(
-            shared,
-            np.array([places[i] for i in which]),
-            tuple(tags[i] for i in which),
-            tuple(cards[i] for i in which),
-            columns,
-            tuple(partial(_trial, self._plan, list_of, i) for i in which),
+            self.structures.setdefault(recorded.structure, recorded.structure),
+            np.array([loops.places[i] for i in which]),
+            tuple(all_of_them.tags[i] for i in which),
+            tuple(all_of_them.cards[i] for i in which),
+            recorded.columns(lot.columns),
+            tuple(partial(_trial, self._plan, all_of_them, i) for i in which),
         )
 
     def _alone(self, loops: PlacedLoops, which: int) -> Group | Failed:

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats
-from pidemu.columns.replay import Fits, Recording
-from pidemu.columns.traced import NotTracedError, Tape, value_of
+from pidemu.columns.replay import Recording
+from pidemu.columns.traced import NotTracedError, Tape
 from pidemu.fleet.kinds import with_numbers
 from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.program.ir import Structure
@@ -65,19 +65,12 @@ class RecordedLoop:
     structure: Structure
     recording: Recording
 
-    def prepare(self, numbers: Floats) -> tuple[PreparedColumns, Fits]:
-        """Return the numbers of loops of the kind, and for which loops they are right: the others have another structure.
-
-        Parameters
-        ----------
-        numbers : ndarray, shape (numbers, loops)
-            Their numbers (`pidemu.fleet.kinds.Numbered`).
-        """
-        found, fits = self.recording.replay(numbers)
+    def columns(self, found: Floats) -> PreparedColumns:
+        """Return the results of the recording by name, shape (results, loops)."""
         s = self.structure
         ends = np.cumsum([len(s.coefficients), len(s.states), len(s.lines)])
         values, initial, lengths, (scan, scans, answer) = np.split(found, ends)
-        return PreparedColumns(values.T, initial.T, lengths.T, scan, scans, answer), fits
+        return PreparedColumns(values.T, initial.T, lengths.T, scan, scans, answer)
 
 
 def record(loop: Loop, numbers: Sequence[float], plan: FleetPlan) -> RecordedLoop:
@@ -107,8 +100,4 @@ def record(loop: Loop, numbers: Sequence[float], plan: FleetPlan) -> RecordedLoo
     if not feedback_is_negative(trial):
         raise NotTracedError("whether the loop is stable is looked up for it alone")
     results = (*program.values, *program.initial, *program.lengths, trial.scan, trial.scans, last_answer(trial))
-    recording = Recording.of(tape, results)
-    found, fits = recording.replay(np.array([numbers], dtype=np.float64).T)
-    if not fits[0] or found[:, 0].tolist() != [value_of(x) for x in results]:
-        raise NotTracedError("what was recorded does not give back the loop it was recorded from")
-    return RecordedLoop(program.structure, recording)
+    return RecordedLoop(program.structure, Recording.of(tape, numbers, results))
