@@ -14,7 +14,7 @@ from decimal import Decimal
 from numbers import Real
 from typing import Any, Final
 
-from pidemu.columns.traced import Traced, isfinite
+from pidemu.columns.traced import Traced, as_written, isfinite
 from pidemu.errors import PidemuError
 from pidemu.excerpt import quoted
 
@@ -121,6 +121,9 @@ def plain_number(text: str, *, words: bool = False) -> float:
     ValueError: '1_0' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3
     """
     text = text.strip(" \t")
+    traced = as_written(text)
+    if traced is not None:
+        return traced  # type: ignore[return-value]  # it stands for a number that is read
     if _PLAIN.fullmatch(text):
         value = float(text)
         if math.isinf(value):

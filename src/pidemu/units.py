@@ -32,7 +32,7 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import Any, Final
 
-from pidemu.columns.traced import each, is_traced, isinf, isnan, plain, sign_of
+from pidemu.columns.traced import each, is_traced, isfinite, isinf, isnan, plain, sign_of
 from pidemu.errors import UnitError, suggest
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number
@@ -474,16 +474,20 @@ def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = 
     >>> convert_unit(Role.DEADBAND, 9, UNITS["degF"], UNITS["degC"])
     5.0
     """
+    value = plain(value) + 0.0  # no negative zero
     if spans.degree is None:  # two kinds of degree: the span is in one of them
         spans = replace(spans, degree=old.degree or new.degree)
-    if not math.isfinite(value) or (value == 0 and is_reciprocal(role, old)):
+    inverted = is_reciprocal(role, old), is_reciprocal(role, new)
+    if not isfinite(value) or (value == 0 and inverted[0]):
         return from_canonical(role, to_canonical(role, value, old, spans), new, spans)
     check_unit(role, old)
     check_unit(role, new)
-    canonical = _inward(role, Fraction(value), old, spans)
-    if canonical == 0 and is_reciprocal(role, new):
-        return math.inf
-    try:
-        return float(_outward(role, canonical, new, spans))
-    except OverflowError:
-        return math.copysign(math.inf, value)
+    c, d = _constant(role, old, spans), _constant(role, new, spans)
+    match inverted:
+        case (False, False):
+            return _times(c / d, value)
+        case (True, True):
+            return _times(d / c, value)
+        case (True, False):
+            return _over(c / d, value)
+    return math.inf if value == 0 else _over(d / c, value)

@@ -11,9 +11,11 @@ with a number whose origin is lost. What is in here under the name of such a fun
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, Final
@@ -232,6 +234,25 @@ class Traced:
 
 
 Real.register(Traced)
+
+
+_WRITTEN: ContextVar[Mapping[str, Traced] | None] = ContextVar("numbers that words stand for", default=None)
+
+
+@contextlib.contextmanager
+def standing_for(numbers: Mapping[str, Traced]) -> Iterator[None]:
+    """Let words stand for traced numbers where a text is read (`as_written`)."""
+    before = _WRITTEN.set(numbers)
+    try:
+        yield
+    finally:
+        _WRITTEN.reset(before)
+
+
+def as_written(word: str) -> Traced | None:
+    """Return the traced number that a word stands for, if it does for one."""
+    numbers = _WRITTEN.get()
+    return None if numbers is None else numbers.get(word)
 
 
 def value_of(x: Any) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Sequence
-from functools import cached_property
 from typing import overload
 
 import numpy as np
@@ -22,10 +21,17 @@ class LoopList(Sequence[Loop]):
     ----------
     loops : iterable of Loop
         The loops.
+
+    Attributes
+    ----------
+    tags, cards : sequence of str
+        The names of the loops, and the ids of their cards.
     """
 
     def __init__(self, loops: Iterable[Loop]) -> None:
         self._loops = tuple(loops)
+        self.tags: Sequence[str] = [loop.tag for loop in self._loops]
+        self.cards: Sequence[str] = [loop.settings.card.id for loop in self._loops]
 
     def __len__(self) -> int:
         return len(self._loops)
@@ -35,7 +41,10 @@ class LoopList(Sequence[Loop]):
     @overload
     def __getitem__(self, at: slice) -> LoopList: ...
     def __getitem__(self, at: int | slice) -> Loop | LoopList:
-        return self.chosen(range(len(self))[at]) if isinstance(at, slice) else self._loops[at]
+        return self.chosen(range(len(self))[at]) if isinstance(at, slice) else self._at(at)
+
+    def _at(self, which: int) -> Loop:
+        return self._loops[which]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and len(self) == len(other) and all(map(operator.eq, self, other))
@@ -45,16 +54,6 @@ class LoopList(Sequence[Loop]):
     def chosen(self, which: Sequence[int]) -> LoopList:
         """Return some of the loops."""
         return LoopList([self._loops[i] for i in which])
-
-    @cached_property
-    def tags(self) -> Sequence[str]:
-        """The names of the loops."""
-        return [loop.tag for loop in self._loops]
-
-    @cached_property
-    def cards(self) -> Sequence[str]:
-        """The ids of the loops' cards."""
-        return [loop.settings.card.id for loop in self._loops]
 
     def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
         """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""
