@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,18 +20,21 @@ from pidemu.columns.lots import KindOfComputation, Lot
 from pidemu.columns.replay import Recording
 from pidemu.columns.traced import NotTracedError, Tape, standing_for
 from pidemu.fleet.kinds import Kind, numbered
-from pidemu.fleet.rows import Row, RowReader
+from pidemu.fleet.rows import Row, RowReader, check_row
 from pidemu.settings.ranges import RANGES
 
-_NUMBER: Final = re.compile(r"(?<![\w.+-])([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![\d.+-])")
-_COLUMNS: Final = ("card", "action", "settings", "process", "scan", "limits", "setpoint", "load", "time")
-"""What makes a pattern; in the first two a number is part of a name."""
-_END: Final = "\x1f"
-"""Between the cells of a pattern; it stands in none."""
+_NUMBER: Final = re.compile(r"([-+.0-9](?<![\w.+-].)[0-9.]*(?:[eE][+-]?[0-9]+)?)(?![\d.+-])")
+"""What may be a number, and is no part of a name or of a longer number."""
+_TAG: Final = re.compile(r'[A-Za-z0-9_][\w.:/#-]*|"[A-Za-z0-9_][\w.:/# -]*[\w.:/#-]"', re.ASCII)
+"""A tag that is the same however it is read, with or without quotation marks."""
+_QUOTED: Final = re.compile('[^"]*|"[^"]*"')
+_WITH_NUMBERS: Final = ("scan", "limits", "setpoint", "load", "time")
+"""Cells that hold numbers and their units only."""
 _OF_PROCESS: Final = ("gain", "lag", "lead", "delay")
 _NAME: Final = re.compile(r"([^;,=]*)=\s*\Z")
 _WORD: Final = "000000000{}"
-"""What stands for a number in a row that is recorded: a number that nobody writes so."""
+_WORDS: Final = re.compile("0{9}([0-9]+)")
+"""What stands for a number in a row that is recorded: a number as nobody writes it."""
 
 Pattern = tuple[str, ...]
 """The text between the numbers."""
@@ -56,36 +59,64 @@ class RecordedRow:
     recording: Recording
 
 
-@dataclass
 class Patterns:
     """Rows by pattern.
 
-    Attributes
+    Parameters
     ----------
     reader : RowReader
         What reads a row.
+    seen : dict
+        The line of every tag.
     """
 
-    reader: RowReader
-    _found: dict[Pattern, tuple[list[int], list[list[str]]]] = field(default_factory=dict)
-    _free: dict[Pattern, tuple[bool, ...]] = field(default_factory=dict)
+    def __init__(self, reader: RowReader, seen: dict[str, int]) -> None:
+        self._reader, self._seen = reader, seen
+        self._before = reader.header.index("tag")
+        self._found: dict[Pattern, tuple[list[int], list[Sequence[str]]]] = {}
+        self._free: dict[Pattern, tuple[bool, ...] | None] = {}
 
-    def add(self, which: int, row: Row) -> None:
-        """Take a row, by its number."""
-        get = row.get
-        parts = _NUMBER.split(_END.join([get(name, "") for name in _COLUMNS[2:]]))
-        numbers = parts[1::2]
-        pattern = (row["card"], get("action", ""), *parts[::2])
-        free = self._free.get(pattern)
-        if free is None:
-            free = self._free[pattern] = tuple(_free(self.reader, pattern))
+    def take(self, which: int, number: int, line: str) -> str | None:
+        """Take a row, and return its tag; ``None`` where it is to be read alone.
+
+        Parameters
+        ----------
+        which : int
+            The number of the row.
+        number, line : int and str
+            Its line in the file.
+        """
+        delimiter, before = self._reader.delimiter, self._before
+        parts = line.split(delimiter, before + 1)
+        if len(parts) <= before or not _TAG.fullmatch(parts[before]):
+            return None
+        tag, parts[before] = parts[before].strip('"'), ""
+        if before and not all(map(_QUOTED.fullmatch, parts[:before])):
+            return None  # a delimiter within quotation marks
+        words = _NUMBER.split(delimiter.join(parts))
+        pattern, numbers = tuple(words[::2]), words[1::2]
+        free = self._free[pattern] if pattern in self._free else self._looked_at(pattern, numbers)
+        if free is None or self._seen.setdefault(tag, number) != number:
+            return None
         if not all(free):
             pattern, numbers = _refilled(pattern, numbers, free)
-        found = self._found.get(pattern)
-        if found is None:
-            found = self._found[pattern] = ([], [])
-        found[0].append(which)
-        found[1].append(numbers)
+        rows, written = self._found.setdefault(pattern, ([], []))
+        rows.append(which)
+        written.append(numbers)
+        return tag
+
+    def _looked_at(self, pattern: Pattern, numbers: Sequence[str]) -> tuple[bool, ...] | None:
+        """Return which numbers of a pattern differ from loop to loop; ``None`` where it is no row of a loop."""
+        try:
+            actual = self._reader.row(_filled(pattern, numbers), {})
+            check_row({"tag": "?", **actual}, 0, {})
+            marked = self._reader.row(_filled(pattern, map(_WORD.format, range(len(numbers)))), {})
+            free = set(_free(marked, self._reader.card(actual["card"]).data.options))
+            found = tuple(i in free for i in range(len(numbers)))
+        except Exception:  # whatever it is, each row says it for itself
+            found = None
+        self._free[pattern] = found
+        return found
 
     def read(self) -> tuple[list[tuple[RecordedRow, Lot]], list[int]]:
         """Return the numbers of loops of a kind, with how they were read; and which rows are to be read one by one."""
@@ -95,8 +126,8 @@ class Patterns:
             columns, wrong = _as_floats(numbers)
             lot = Lot(np.array(which), columns)
             left += lot.which[wrong].tolist()
-            recorder = _Recorder(self.reader, pattern)
-            found, others = KindOfComputation[RecordedRow]().compute(lot.chosen(~wrong), recorder.record)
+            record = _Recorder(self._reader, pattern).record
+            found, others = KindOfComputation[RecordedRow]().compute(lot.chosen(~wrong), record)
             done += found
             left += others
         return done, left
@@ -113,54 +144,59 @@ class _Recorder:
         """Read a row of these numbers, and return how it was done."""
         tape = Tape()
         words = {_WORD.format(i): tape.number(x) for i, x in enumerate(numbers)}
-        card, action, *texts = self.pattern
-        text = "".join(itertools.chain.from_iterable(itertools.zip_longest(texts, words, fillvalue="")))
-        row = dict(zip(_COLUMNS, (card, action, *text.split(_END)), strict=True))
+        row = self.reader.row(_filled(self.pattern, words), {})
         with standing_for(words):
-            loop = self.reader.loop({"tag": "", **{name: cell for name, cell in row.items() if cell}})
+            loop = self.reader.loop({"tag": "", **row})
         found = numbered(loop)
         if found is None:
             raise NotTracedError("a loop of a kind of its own")
         return RecordedRow(found.kind, loop.settings.card.id, Recording.of(tape, numbers, found.numbers))
 
 
-def _as_floats(numbers: Sequence[Sequence[str]]) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Return numbers by column, and the rows of which one is too large or too small for a computer's."""
-    count = len(numbers[0])
-    flat = np.fromiter(map(float, itertools.chain.from_iterable(numbers)), np.float64, count * len(numbers))
-    columns = flat.reshape(len(numbers), count).T
-    wrong = np.asarray(np.isinf(columns).any(axis=0))
-    for column, row in np.argwhere(columns == 0):
-        wrong[row] |= re.search("[1-9]", numbers[row][column].casefold().partition("e")[0]) is not None
-    return columns, wrong
+def _filled(pattern: Pattern, numbers: Iterator[str] | Sequence[str] | Mapping[str, object]) -> str:
+    """Return the text of a row, its tag empty."""
+    return "".join(itertools.chain.from_iterable(itertools.zip_longest(pattern, numbers, fillvalue="")))
 
 
 def _refilled(pattern: Pattern, numbers: Sequence[str], free: Sequence[bool]) -> tuple[Pattern, list[str]]:
     """Return a pattern with the numbers that are part of it, and the others."""
-    card, action, *texts = pattern
-    filled = [texts[0]]
-    for text, number, is_free in zip(texts[1:], numbers, free, strict=True):
+    filled = [pattern[0]]
+    for text, number, is_free in zip(pattern[1:], numbers, free, strict=True):
         if is_free:
             filled.append(text)
         else:
             filled[-1] += number + text
-    return (card, action, *filled), [number for number, is_free in zip(numbers, free, strict=True) if is_free]
+    return tuple(filled), [number for number, is_free in zip(numbers, free, strict=True) if is_free]
 
 
-def _free(reader: RowReader, pattern: Pattern) -> list[bool]:
-    """Return which numbers of a pattern differ from loop to loop; choices of options, signal ranges and the like are part of it."""
-    card, _, *texts = pattern
+def _free(row: Row, options: Mapping[str, object]) -> Iterator[int]:
+    """Yield which numbers of a marked row differ from loop to loop; choices of options and ranges are part of a pattern."""
+    for column, cell in row.items():
+        for word in _WORDS.finditer(cell):
+            named = _NAME.search(cell[: word.start()])
+            name = named[1].strip() if named else ""
+            of_dial = column == "settings" and name and match_name(name, options) is None and name not in RANGES
+            if of_dial or (column == "process" and name in _OF_PROCESS) or column in _WITH_NUMBERS:
+                yield int(word[1])
+
+
+def _as_floats(numbers: Sequence[Sequence[str]]) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Return numbers by column, and the rows of which one is none, or too large or too small for a computer's."""
+    wrong = np.zeros(len(numbers), dtype=bool)
     try:
-        options = reader.card(card).data.options
-    except Exception:  # whatever it is, each row says it for itself
-        return [False] * (len(texts) - 1)
-    found, cell = [], 0
-    for text in texts[:-1]:
-        cell += text.count(_END)
-        name = _NAME.search(text.rpartition(_END)[2])
-        word = name[1].strip() if name else ""
-        if _COLUMNS[2 + cell] == "settings":
-            found.append(bool(word) and match_name(word, options) is None and word.casefold() not in RANGES)
-        else:
-            found.append(word in _OF_PROCESS if _COLUMNS[2 + cell] == "process" else True)
-    return found
+        flat = np.fromiter(map(float, itertools.chain.from_iterable(numbers)), np.float64)
+    except ValueError:  # such as 1.2.3
+        flat = np.array([_float(word) for row in numbers for word in row])
+    columns = flat.reshape(len(numbers), -1).T
+    wrong |= ~np.isfinite(columns).all(axis=0)
+    for column, row in np.argwhere(columns == 0).tolist():
+        word = numbers[row][column]
+        wrong[row] |= word != "0" and re.search("[1-9]", word.casefold().partition("e")[0]) is not None
+    return columns, wrong
+
+
+def _float(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return np.nan

@@ -78,7 +78,7 @@ class Preparation:
                 yield from (self._group(loops, recorded, one) for recorded, one in done)
         left.sort()
         for start in range(0, len(left), _SLICE):
-            with _no_collection():
+            with no_collection():
                 found = [self._alone(loops, i) for i in left[start : start + _SLICE]]
             yield from found
 
@@ -135,7 +135,7 @@ def reason_of(error: Exception) -> str:
 
 
 @contextlib.contextmanager
-def _no_collection() -> Iterator[None]:
+def no_collection() -> Iterator[None]:
     """Make many objects without looking for circles among them after every few hundred: there are none."""
     was = gc.isenabled()
     gc.disable()

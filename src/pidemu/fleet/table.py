@@ -15,7 +15,7 @@ from pidemu.files.tables import Lines, split_lines, write_table
 from pidemu.fleet.lists import LoopList
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.patterns import Patterns
-from pidemu.fleet.prepare import reason_of
+from pidemu.fleet.prepare import no_collection, reason_of
 from pidemu.fleet.result import HEADER, FleetResult
 from pidemu.fleet.rows import COLUMNS, REQUIRED, Row, RowReader, cells, check_row
 from pidemu.fleet.tabled import TableLoops
@@ -146,8 +146,8 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
     except FleetError as error:
         raise FleetError(f"{visible(str(path))}:{head}: {error}") from None
     reader = RowReader(tuple(header), delimiter, tuple(vendors))
-    rows_read = _Reading(reader, rows)
-    return LoopTable(str(path), *rows_read.result(), lines.skipped)
+    with no_collection():
+        return LoopTable(str(path), *_Reading(reader, rows).result(), lines.skipped)
 
 
 class _Reading:
@@ -156,18 +156,27 @@ class _Reading:
     def __init__(self, reader: RowReader, lines: Sequence[tuple[int, str]]) -> None:
         self._reader, self._lines = reader, lines
         self._wrong: list[WrongRow] = []
-        self._patterns = Patterns(reader)
         self._tags = [""] * len(lines)
+        self._alone: list[int] = []
         seen: dict[str, int] = {}
+        self._patterns = Patterns(reader, seen)
         for which, (number, line) in enumerate(lines):
-            row: Row = {}
-            try:
-                reader.row(line, row)
-                check_row(row, number, seen)
-                self._tags[which] = row["tag"]
-                self._patterns.add(which, row)
-            except Exception as error:  # whatever it is: one wrong row among thousands stops no other
-                self._fail(which, row, error)
+            tag = self._patterns.take(which, number, line)
+            if tag is None:
+                self._look_at(which, seen)
+            else:
+                self._tags[which] = tag
+
+    def _look_at(self, which: int, seen: dict[str, int]) -> None:
+        """Look at a row that is to be read alone."""
+        row: Row = {}
+        try:
+            check_row(self._reader.row(self._lines[which][1], row), self._lines[which][0], seen)
+        except Exception as error:
+            self._fail(which, row, error)
+        else:
+            self._tags[which] = row["tag"]
+            self._alone.append(which)
 
     def _fail(self, which: int, row: Row, error: Exception) -> None:
         reason = _in_one_line(error) if isinstance(error, PidemuError) else reason_of(error)
@@ -178,11 +187,11 @@ class _Reading:
         """Return the loops, their lines, and the rows that make none."""
         alike, others = self._patterns.read()
         alone: dict[int, Loop] = {}
-        for which in others:
+        for which in sorted([*self._alone, *others]):
             row: Row = {}
             try:
                 alone[which] = self._reader.loop(self._reader.row(self._lines[which][1], row))
-            except Exception as error:
+            except Exception as error:  # whatever it is: one wrong row among thousands stops no other
                 self._fail(which, row, error)
         loops = TableLoops(self._reader, self._lines, self._tags, alike, alone)
         self._wrong.sort(key=lambda wrong: wrong.line)
