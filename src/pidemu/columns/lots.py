@@ -52,6 +52,15 @@ class Lot:
         """Return some of them."""
         return Lot(self.which[which], self.columns[:, which])
 
+    @classmethod
+    def joined(cls, lots: Sequence[Lot]) -> Lot:
+        """Return several lots as one, in the order of their numbers."""
+        if len(lots) == 1:
+            return lots[0]
+        which, columns = np.concatenate([lot.which for lot in lots]), np.concatenate([lot.columns for lot in lots], axis=1)
+        order = np.argsort(which)
+        return cls(which[order], columns[:, order])
+
 
 @dataclass
 class KindOfComputation(Generic[R]):

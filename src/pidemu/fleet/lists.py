@@ -57,22 +57,29 @@ class LoopList(Sequence[Loop]):
 
     def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
         """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""
-        found: dict[Kind, tuple[list[int], list[list[float]]]] = {}
-        others = []
-        for i, loop in enumerate(self._loops):
-            one = numbered(loop)
-            if one is None:
-                others.append(i)
-            else:
-                which, numbers = found.setdefault(one.kind, ([], []))
-                which.append(i)
-                numbers.append(one.numbers)
-        return [(kind, lot_of(which, numbers)) for kind, (which, numbers) in found.items()], others
+        return by_kind(enumerate(self._loops))
 
 
-def lot_of(which: Sequence[int], numbers: Sequence[Sequence[float]]) -> Lot:
-    """Return loops of one kind and their numbers as columns."""
-    return Lot(np.array(which), np.array(numbers, dtype=np.float64).T)
+def by_kind(loops: Iterable[tuple[int, Loop]]) -> tuple[list[tuple[Kind, Lot]], list[int]]:
+    """Return the numbers of loops by kind, and those loops that are of a kind of their own.
+
+    Parameters
+    ----------
+    loops : iterable of (int, Loop)
+        The loops, with their numbers in a list.
+    """
+    found: dict[Kind, tuple[list[int], list[list[float]]]] = {}
+    others = []
+    for i, loop in loops:
+        one = numbered(loop)
+        if one is None:
+            others.append(i)
+        else:
+            which, numbers = found.setdefault(one.kind, ([], []))
+            which.append(i)
+            numbers.append(one.numbers)
+    lots = [(kind, Lot(np.array(which), np.array(numbers, dtype=np.float64).T)) for kind, (which, numbers) in found.items()]
+    return lots, others
 
 
 class PlacedLoops(Sequence[tuple[int, Loop]]):

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pidemu.columns.lots import Lot
-from pidemu.fleet.kinds import Kind, numbered
-from pidemu.fleet.lists import LoopList, lot_of
+from pidemu.fleet.kinds import Kind
+from pidemu.fleet.lists import LoopList, by_kind
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.patterns import RecordedRow
 from pidemu.fleet.rows import RowReader
@@ -83,12 +83,8 @@ class TableLoops(LoopList):
 
     def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
         """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""
-        found = list(self._alike)
-        others = []
-        for i, loop in self._alone.items():
-            one = numbered(loop)
-            if one is None:
-                others.append(i)
-            else:
-                found.append((one.kind, lot_of([i], [one.numbers])))
-        return found, others
+        alone, others = by_kind(self._alone.items())
+        found: dict[Kind, list[Lot]] = {}
+        for kind, lot in (*self._alike, *alone):
+            found.setdefault(kind, []).append(lot)
+        return [(kind, Lot.joined(lots)) for kind, lots in found.items()], others
