@@ -320,9 +320,13 @@ def isinf(x: Any) -> bool:
 
 
 def sign_of(x: Any) -> float:
-    """Return 1.0 with the sign of a number, which is not 0 where it is traced."""
+    """Return 1.0 with the sign of a number; a traced one has to be above or below zero."""
     if isinstance(x, Traced):
-        return 1.0 if x > 0 else -1.0
+        if x > 0:
+            return 1.0
+        if x < 0:
+            return -1.0
+        raise NotTracedError("the sign of zero is not recorded")
     return math.copysign(1.0, x)
 
 

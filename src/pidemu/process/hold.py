@@ -233,7 +233,7 @@ def sampled_columns(n: int, gain: Floats, delay: Floats, h: Floats, *roots: Floa
     ndarray, shape (processes, n * n + 3 n + 2)
         In a row each: F, E, G, c, D and d, as `SampledProcess` names them.
     """
-    poles = np.array(roots[:n]).reshape(n, -1).T
+    poles = np.array(roots[:n]).reshape(n, gain.size).T
     poles = np.take_along_axis(poles, np.argsort(-np.abs(poles), axis=1, kind="stable"), axis=1)
     drive = np.where(poles == 0, 1.0, -poles)
     A, B = np.zeros((gain.size, n, n)), np.zeros((gain.size, n))
