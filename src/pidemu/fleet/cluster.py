@@ -24,7 +24,7 @@ _FIRST: Final = 64
 """Loops in the first chunks; how long they take decides about the size of the next."""
 _SECONDS: Final = 3.0
 """How long a chunk should take: much longer than Dask needs for a task, short enough to be done again where a worker is lost."""
-_MOST: Final = 8192
+_MOST: Final = 4096
 _AHEAD: Final = 3
 """Chunks per thread of a worker that are under way."""
 _PATIENCE: Final = 10.0
