@@ -36,6 +36,9 @@ _WORD: Final = "000000000{}"
 _WORDS: Final = re.compile("0{9}([0-9]+)")
 """What stands for a number in a row that is recorded: a number as nobody writes it."""
 
+_AT_ONCE: Final = 4096
+"""Rows whose words are made numbers at a time."""
+
 Pattern = tuple[str, ...]
 """The text between the numbers."""
 
@@ -73,7 +76,7 @@ class Patterns:
     def __init__(self, reader: RowReader, seen: dict[str, int]) -> None:
         self._reader, self._seen = reader, seen
         self._before = reader.header.index("tag")
-        self._found: dict[Pattern, tuple[list[int], list[Sequence[str]]]] = {}
+        self._found: dict[Pattern, _Rows] = {}
         self._free: dict[Pattern, tuple[bool, ...] | None] = {}
 
     def take(self, which: int, number: int, line: str) -> str | None:
@@ -100,9 +103,10 @@ class Patterns:
             return None
         if not all(free):
             pattern, numbers = _refilled(pattern, numbers, free)
-        rows, written = self._found.setdefault(pattern, ([], []))
-        rows.append(which)
-        written.append(numbers)
+        rows = self._found.get(pattern)
+        if rows is None:
+            rows = self._found[pattern] = _Rows()
+        rows.add(which, numbers)
         return tag
 
     def _looked_at(self, pattern: Pattern, numbers: Sequence[str]) -> tuple[bool, ...] | None:
@@ -122,15 +126,44 @@ class Patterns:
         """Return the numbers of loops of a kind, with how they were read; and which rows are to be read one by one."""
         done: list[tuple[RecordedRow, Lot]] = []
         left: list[int] = []
-        for pattern, (which, numbers) in self._found.items():
-            columns, wrong = _as_floats(numbers)
-            lot = Lot(np.array(which), columns)
-            left += lot.which[wrong].tolist()
+        for pattern, rows in self._found.items():
+            lot, wrong = rows.as_lot()
+            left += wrong
             record = _Recorder(self._reader, pattern).record
-            found, others = KindOfComputation[RecordedRow]().compute(lot.chosen(~wrong), record)
+            found, others = KindOfComputation[RecordedRow]().compute(lot, record)
             done += found
             left += others
         return done, left
+
+
+class _Rows:
+    """Rows of a pattern: their numbers are kept as such, which takes a tenth of the room of their words."""
+
+    def __init__(self) -> None:
+        self._which: list[int] = []
+        self._words: list[Sequence[str]] = []
+        self._lots: list[Lot] = []
+        self._wrong: list[int] = []
+
+    def add(self, which: int, words: Sequence[str]) -> None:
+        """Add a row, by its number."""
+        self._which.append(which)
+        self._words.append(words)
+        if len(self._words) == _AT_ONCE:
+            self._keep()
+
+    def _keep(self) -> None:
+        columns, wrong = _as_floats(self._words)
+        lot = Lot(np.array(self._which), columns)
+        self._lots.append(lot.chosen(~wrong))
+        self._wrong += lot.which[wrong].tolist()
+        self._which, self._words = [], []
+
+    def as_lot(self) -> tuple[Lot, list[int]]:
+        """Return the rows, and those of which a number is none."""
+        if self._words:
+            self._keep()
+        return Lot.joined(self._lots), self._wrong
 
 
 @dataclass(frozen=True, slots=True)

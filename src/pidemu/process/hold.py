@@ -305,13 +305,15 @@ def expm1(A: Floats, B: Floats, times: Sequence[float] | Floats) -> tuple[Floats
     sizes = np.abs(X).sum(axis=-1).max(axis=(-2, -1))
     doublings = np.array([_doublings(size) for size in sizes.ravel().tolist()], dtype=np.int64).reshape(sizes.shape)
     X /= np.ldexp(1.0, doublings)[..., None, None, None]
-    F = term = X
+    F, term = X.copy(), X
     for k in range(2, _TERMS):
-        term = term @ X / k
-        F = F + term
+        term = term @ X
+        term /= k
+        F += term
     for done in range(doublings.max(initial=0)):
         left = doublings > done
-        F[left] = 2 * F[left] + F[left] @ F[left]
+        some = F if left.all() else F[left]
+        F[left] = 2 * some + some @ some
     return F[..., :n, :n], F[..., :n, n]
 
 
