@@ -131,7 +131,7 @@ def _mend(members: Group, columns: dict[str, Floats], records: Floats | None) ->
     """Run loops again, scan by scan, whose measurement outgrew all numbers: what the card does then is not in its program."""
     away = []
     for i in np.flatnonzero(~np.isfinite(list(columns.values())).all(axis=0)).tolist():
-        trial = members.trials[i]()
+        trial = members.trial(int(members.places[i]))
         pv, out, _ = run_trial(trial)
         for name, value in figures_of(trial, pv, out).items():
             columns[name][i] = value

@@ -196,7 +196,7 @@ def run_chunk(chunk: PlacedLoops, plan: FleetPlan) -> tuple[list[BlockOutcome | 
 
 
 def _light(one: BlockOutcome | Failed) -> BlockOutcome | Failed:
-    """Return what is sent back: the trials and what came of them, without the programs' numbers."""
+    """Return what is sent back: what came of the loops, without the numbers of their programs."""
     if isinstance(one, Failed):
         return one
     return replace(one, members=one.members.light())

@@ -63,8 +63,8 @@ class Group:
         Their names, and the ids of their cards.
     columns : PreparedColumns
         The numbers of their programs.
-    trials : tuple of callable
-        What makes the trial of each.
+    trial : callable
+        From a place to the trial of its loop.
     judged : tuple or None
         Margins of each, and whether it is stable; where there are neither, ``None``.
     """
@@ -74,7 +74,7 @@ class Group:
     tags: tuple[str, ...]
     cards: tuple[str, ...]
     columns: PreparedColumns
-    trials: tuple[Callable[[], Trial], ...]
+    trial: Callable[[int], Trial]
     judged: tuple[tuple[LoopFigures | None, bool | None], ...] | None = None
 
     def __len__(self) -> int:
@@ -105,7 +105,7 @@ class Group:
             _some(self.tags, which),
             _some(self.cards, which),
             self.columns.chosen(at),
-            _some(self.trials, which),
+            self.trial,
             judged,
         )
 
@@ -113,7 +113,7 @@ class Group:
         """Return what is known of the loops, without what it takes to run them."""
         none = np.empty((len(self), 0))
         columns = replace(self.columns, values=none, initial=none, lengths=none)
-        return replace(self, structure=None, columns=columns, trials=())  # type: ignore[arg-type]
+        return replace(self, structure=None, columns=columns, trial=None)  # type: ignore[arg-type]
 
     def parts(self, width: int, longer: int) -> Iterator[Group]:
         """Yield the loops of one block after the other; a block runs until its last loop is done.
@@ -161,7 +161,7 @@ def _joined(groups: Sequence[Group]) -> Group:
         _all(g.tags for g in groups),
         _all(g.cards for g in groups),
         PreparedColumns.joined([g.columns for g in groups]),
-        _all(g.trials for g in groups),
+        groups[0].trial,
         judged,
     )
 

@@ -107,6 +107,10 @@ class PlacedLoops(Sequence[tuple[int, Loop]]):
     def __len__(self) -> int:
         return len(self.places)
 
+    def at(self, place: int) -> Loop:
+        """Return the loop at a place of the fleet."""
+        return self.loops[self.places.index(place)]
+
     @overload
     def __getitem__(self, at: int) -> tuple[int, Loop]: ...
     @overload

@@ -20,7 +20,7 @@ from pidemu.columns.lots import KindOfComputation, Lot
 from pidemu.errors import PidemuError
 from pidemu.fleet.group import Group
 from pidemu.fleet.lists import PlacedLoops
-from pidemu.fleet.loops import FleetPlan, Loop
+from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.recorded import PreparedColumns, RecordedLoop, record
 from pidemu.program.ir import Structure
 from pidemu.simulation.measured import measured
@@ -67,7 +67,13 @@ class Preparation:
         self.structures: dict[Structure, Structure] = {}
 
     def prepared(self, loops: PlacedLoops) -> Iterator[Group | Failed]:
-        """Yield loops as programs, many of them at once, or why one cannot be run."""
+        """Yield loops as programs, many of them at once, or why one cannot be run.
+
+        Parameters
+        ----------
+        loops : PlacedLoops
+            Some loops of the fleet.
+        """
         left: list[int] = list(range(len(loops)))
         if not self._plan.margins:  # these take each loop by itself
             kinds, left = loops.loops.by_kind()
@@ -93,7 +99,7 @@ class Preparation:
             tuple(all_of_them.tags[i] for i in which),
             tuple(all_of_them.cards[i] for i in which),
             recorded.columns(lot.columns),
-            tuple(partial(_trial, self._plan, all_of_them, i) for i in which),
+            partial(_trial, self._plan, loops),
         )
 
     def _alone(self, loops: PlacedLoops, which: int) -> Group | Failed:
@@ -109,13 +115,12 @@ class Preparation:
             return Failed(place, reason_of(error))
         numbers = (program.values, program.initial, program.lengths, trial.scan, trial.scans, last_answer(trial))
         columns = PreparedColumns(*(np.array([x], dtype=np.float64) for x in numbers))
-        judged = ((margins, stable),)
-        trials = (partial(_trial, self._plan, loops.loops, which),)
-        return Group(shared, np.array([place]), (loop.tag,), (loop.settings.card.id,), columns, trials, judged)
+        trial_at, card = partial(_trial, self._plan, loops), loop.settings.card.id
+        return Group(shared, np.array([place]), (loop.tag,), (card,), columns, trial_at, ((margins, stable),))
 
 
-def _trial(plan: FleetPlan, loops: Sequence[Loop], which: int) -> Trial:
-    return plan.trial(loops[which])
+def _trial(plan: FleetPlan, loops: PlacedLoops, place: int) -> Trial:
+    return plan.trial(loops.at(place))
 
 
 def reason_of(error: Exception) -> str:
