@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 import pidemu
+from pidemu.fleet.finished import keys
 from pidemu.fleet.kinds import numbered
+from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.patterns import Patterns
 from pidemu.fleet.rows import RowReader
 from pidemu.fleet.table import LoopTable, read_loops
@@ -132,6 +134,11 @@ def test_a_choice_that_looks_like_a_number_is_no_number(tmp_path: Path, monkeypa
     loops = read_loops(path).loops
     assert count == [3]
     assert [loop.settings.options["STRUCTURE"] for loop in loops][:6] == ["1", "2", "3", "1", "2", "3"]
+
+
+def test_keys_of_the_loops_of_a_table_are_those_of_the_loops_themselves(tmp_path: Path) -> None:
+    loops = read_loops(table(tmp_path / "loops.csv", 200, 5)).loops
+    assert keys(loops.quickly(), FleetPlan()) == keys(list(loops), FleetPlan())
 
 
 def test_parts_of_a_table_are_its_loops(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def _key(loop: Loop, plan: FleetPlan, equations: dict[int, str]) -> str:
         equations[id(variant)],
         [(name, v.value, v.unit, v.spans) for name, v in settings.items()],
         (settings.pv_range, settings.op_range, settings.pace, settings.lag, settings.scan),
-        (process.gain, tuple(process.poles), tuple(process.zeros), process.delay),
+        (process.gain, [complex(p) for p in process.poles], [complex(z) for z in process.zeros], process.delay),
         (loop.scan, loop.action, loop.output_limits, loop.initial, said, plan.margins),
     )
     return hashlib.sha256(repr(what).encode(errors="backslashreplace")).hexdigest()[:_LENGTH]

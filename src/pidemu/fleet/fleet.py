@@ -137,7 +137,7 @@ class Fleet:
         """Return the loops that are to be run, with their places; the result takes those that an earlier run had done."""
         done: set[int] = set()
         if store is not None:
-            for place, one, signals in store.begin(list(self.loops.tags), keys(self.loops, plan)):
+            for place, one, signals in store.begin(list(self.loops.tags), keys(self.loops.quickly(), plan)):
                 result.resume(place, one, signals)
                 done.add(place)
         left = [place for place in range(len(self.loops)) if place not in done]

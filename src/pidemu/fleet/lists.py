@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
 
 import numpy as np
@@ -54,6 +54,10 @@ class LoopList(Sequence[Loop]):
     def chosen(self, which: Sequence[int]) -> LoopList:
         """Return some of the loops."""
         return LoopList([self._loops[i] for i in which])
+
+    def quickly(self) -> Iterator[Loop]:
+        """Yield the loops for who looks at their numbers: tags, and how settings were typed, may be another loop's."""
+        return iter(self._loops)
 
     def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
         """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""

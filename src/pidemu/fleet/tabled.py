@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from pidemu.columns.lots import Lot
-from pidemu.fleet.kinds import Kind
+from pidemu.fleet.kinds import Kind, with_numbers
 from pidemu.fleet.lists import LoopList, by_kind
 from pidemu.fleet.loops import Loop
 from pidemu.fleet.patterns import RecordedRow
@@ -80,6 +80,15 @@ class TableLoops(LoopList):
                 part._alike.append((kind, Lot(place[some.which], some.columns)))
         part._alone = {int(place[i]): loop for i, loop in self._alone.items() if place[i] >= 0}
         return part
+
+    def quickly(self) -> Iterator[Loop]:
+        """Yield the loops for who looks at their numbers: tags, and how settings were typed, may be another loop's."""
+        found: list[Loop | None] = [self._alone.get(i) for i in range(len(self))]
+        for _, lot in self._alike:
+            first = self[int(lot.which[0])]
+            for which, numbers in zip(lot.which.tolist(), lot.columns.T.tolist(), strict=True):
+                found[which] = with_numbers(first, numbers)
+        return (loop for loop in found if loop is not None)
 
     def by_kind(self) -> tuple[list[tuple[Kind, Lot]], list[int]]:
         """Return the numbers of the loops by kind, and those loops that are of a kind of their own."""
