@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import random
 from collections.abc import Sequence
 from dataclasses import replace
@@ -212,8 +213,6 @@ def test_a_measurement_that_outgrows_all_numbers_is_seen_to_in_columns_too() -> 
 
 
 def test_the_loops_of_a_table_are_pickled_with_their_numbers(tmp_path: Path) -> None:
-    import pickle
-
     text = "tag,card,settings,process,scan\n" + "".join(
         f'L{i},generic/standard,K={1 + i / 10}; Ti={9 + i},"gain=1,lag={5 + i},delay=1.5",0.5\n' for i in range(20)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import random
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 import pidemu
+from pidemu.card.library import builtin_folder
 from pidemu.fleet.finished import keys
 from pidemu.fleet.kinds import numbered
 from pidemu.fleet.loops import FleetPlan
@@ -155,3 +157,16 @@ def test_parts_of_a_table_are_its_loops(tmp_path: Path) -> None:
         loops[len(loops)]
     which = sorted(i for kind, lot in part.by_kind()[0] for i in lot.which.tolist())
     assert which == sorted(set(range(20)) - set(part.by_kind()[1]))
+
+
+def test_rows_that_go_to_another_machine_take_their_cards_along(tmp_path: Path) -> None:
+    own = tmp_path / "cards" / "acme" / "pid.yaml"
+    own.parent.mkdir(parents=True)
+    own.write_bytes((builtin_folder() / "generic" / "standard.yaml").read_bytes())
+    path = tmp_path / "loops.csv"
+    rows = [f'L{i},acme/pid,K={i + 1}; Ti=9; Td=0,"gain=1,lag=9",0.5' for i in range(6)]
+    path.write_text("\n".join(["tag,card,settings,process,scan", *rows]), encoding="utf-8")
+    loops = read_loops(path, [tmp_path / "cards"]).loops
+    sent, numbers = pickle.dumps(loops[2:6]), [loop.settings["K"].value for loop in loops]
+    own.unlink()
+    assert [loop.settings["K"].value for loop in pickle.loads(sent)] == numbers[2:6]

@@ -25,7 +25,7 @@ from pidemu.settings.ranges import RANGES
 
 _NUMBER: Final = re.compile(r"([-+.0-9](?<![\w.+-].)[0-9.]*(?:[eE][+-]?[0-9]+)?)(?![\d.+-])")
 """What may be a number, and is no part of a name or of a longer number."""
-_TAG: Final = re.compile(r'[A-Za-z0-9_][\w.:/#-]*|"[A-Za-z0-9_][\w.:/# -]*[\w.:/#-]"', re.ASCII)
+_TAG: Final = re.compile(r'("?)\w(?:[\w.:/# -]*[\w.:/#-])?\1')
 """A tag that is the same however it is read, with or without quotation marks."""
 _QUOTED: Final = re.compile('[^"]*|"[^"]*"')
 _WITH_NUMBERS: Final = ("scan", "limits", "setpoint", "load", "time")

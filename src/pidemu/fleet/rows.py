@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,6 +44,7 @@ class RowReader:
     header: tuple[str, ...]
     delimiter: str
     vendors: tuple[str | Path, ...] = ()
+    _cards: dict[str, Card] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def row(self, line: str, into: Row) -> Row:
         """Return what the cells of a line say; also where it raises, `into` has what could be read.
@@ -63,8 +64,10 @@ class RowReader:
         return into
 
     def card(self, card_id: str) -> Card:
-        """Return a card."""
-        return load_card_by_id(card_id, self.vendors)
+        """Return a card; it goes with the reader to wherever rows are read, where there may be no such file."""
+        if card_id not in self._cards:
+            self._cards[card_id] = load_card_by_id(card_id, self.vendors)
+        return self._cards[card_id]
 
     def loop(self, row: Mapping[str, str]) -> Loop:
         """Return the loop of a row.
