@@ -33,8 +33,8 @@ Guard = tuple[str, int, int, bool]
 """A comparison, the places of its operands, and how it came out."""
 
 
-class NotTracedError(TypeError):
-    """A traced number was taken for a plain one: its origin would be lost."""
+class NotTracedError(Exception):
+    """A traced number was taken for a plain one: its origin would be lost. No code on its way expects this error."""
 
 
 @dataclass(frozen=True, slots=True)
