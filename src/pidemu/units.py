@@ -419,11 +419,25 @@ def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool
         return (0.0 if inverted else math.inf) * sign_of(value)
     if value == 0 and inverted:
         return math.inf
-    if unit.scans and is_traced(value, spans.scan):
-        found: float = each(lambda x, h: _convert(role, x, unit, replace(spans, scan=h), inward=inward), value, spans.scan)
-        return found
+    if unit.scans and is_traced(spans.scan):
+        return _at_any_scan(role, value, unit, spans, inward=inward)
     c = _constant(role, unit, spans)
     return _over(c, value) if inverted else _times(c if inward else 1 / c, value)
+
+
+def _at_any_scan(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
+    """Return what a dial that counts in scans converts to, at a traced scan interval."""
+    c, twice = (_constant(role, unit, replace(spans, scan=h)) for h in (1.0, 2.0))
+    grows, inverted = twice > c, is_reciprocal(role, unit)  # in proportion to the interval, or to its reciprocal
+    if not inward and not inverted:
+        c, grows = 1 / c, not grows
+
+    def converted(x: float, h: float) -> float:
+        scans, parts = h.as_integer_ratio() if grows else h.as_integer_ratio()[::-1]
+        return (_quotient if inverted else _product)(c.numerator * scans, c.denominator * parts, x)
+
+    found: float = each(converted, value, spans.scan)
+    return found
 
 
 def _times(c: Fraction, x: float) -> float:
