@@ -21,7 +21,6 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial
 
 from pidemu.arrays import Floats
 from pidemu.columns.traced import is_traced, isfinite, value_of, whole
@@ -277,13 +276,25 @@ def chain(poles: Sequence[complex]) -> tuple[Floats, Floats]:
 
 def outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats, float]:
     """Return what of the states makes the numerator, and what is left at once: division by one section after the other."""
-    rest = np.array(polynomial_of(zeros))
+    rest = list(polynomial_of(zeros))
     row: list[float] = []
     for p in reversed(_in_order(poles)):
-        rest, left = polynomial.polydiv(rest, polynomial_of([p]))
+        rest, left = _divided(rest, polynomial_of([p]))
         constant, slope = (*left, 0.0)[:2]
         row = [constant + slope * p.real, slope * abs(p), *row] if p.imag else [constant, *row]
-    return np.array(row, dtype=np.float64), float(rest[0])
+    return np.array(row, dtype=np.float64), rest[0]
+
+
+def _divided(polynomial: Sequence[float], by: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return quotient and remainder of polynomials, coefficients ascending, in plain numbers: arrays of two or three are slower."""
+    left, degree = list(polynomial), len(by) - 1
+    while len(left) > 1 and not left[-1]:
+        left.pop()
+    lower = [x / by[-1] for x in by[:-1]]
+    for last in range(len(left) - 1, degree - 1, -1):
+        for i, x in enumerate(lower, last - degree):
+            left[i] -= x * left[last]
+    return [x / by[-1] for x in left[degree:]] or [left[0] * 0.0], left[:degree]
 
 
 def expm1(A: Floats, B: Floats, times: Sequence[float] | Floats) -> tuple[Floats, Floats]:
