@@ -168,6 +168,17 @@ def test_a_loop_of_another_structure_costs_programs_of_its_own_only(monkeypatch:
     assert found == alone(loops)
 
 
+def test_processes_with_pairs_of_poles_and_zeros_are_prepared_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    loops = []
+    for i, loop in enumerate(alike(60)):
+        pole, zero = complex(-0.2 - i / 300, 0.5 + i / 100), complex(-1, 0.1 + i / 50)
+        loops.append(replace(loop, process=Process(0.5 + i, [-0.5, pole, pole.conjugate()], [zero, zero.conjugate()], 2.2)))
+    built = counted(monkeypatch)
+    found = together(loops)
+    assert built == [1]
+    assert found == alone(loops)
+
+
 def test_margins_and_what_is_chosen_by_the_frequency_response_take_each_loop_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_args: Any) -> Any:
         raise AssertionError

@@ -236,6 +236,20 @@ class Traced:
 Real.register(Traced)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TracedRoot:
+    """One of a pair of complex roots of a polynomial.
+
+    Attributes
+    ----------
+    real, imag : Traced
+        Its parts.
+    """
+
+    real: Traced
+    imag: Traced
+
+
 _WRITTEN: ContextVar[Mapping[str, Traced] | None] = ContextVar("numbers that words stand for", default=None)
 
 
@@ -287,7 +301,7 @@ def whole(function: Callable[..., tuple[Any, Any]], numbers: Sequence[Any], resu
 
 def is_traced(*numbers: Any) -> bool:
     """Tell whether one of the numbers is traced."""
-    return any(isinstance(x, Traced) for x in numbers)
+    return any(isinstance(x, Traced | TracedRoot) for x in numbers)
 
 
 def plain(x: Any) -> Any:

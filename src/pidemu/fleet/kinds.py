@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from pidemu.columns.traced import Traced
+from pidemu.columns.traced import Traced, TracedRoot, is_traced
 from pidemu.fleet.loops import Loop
 
 _STATED: Final = ("scan", "setpoint", "load", "time", "output_limits", "initial")
@@ -28,8 +28,8 @@ class Numbered:
     kind : Kind
         Its kind.
     numbers : list of float
-        The values of the dials; gain, dead time, poles and zeros of the process; then what the loop states of scan interval, steps,
-        time, limits and start.
+        The values of the dials; gain, dead time, poles and zeros of the process, of a pair the upper one's two parts; then what the
+        loop states of scan interval, steps, time, limits and start.
     """
 
     kind: Kind
@@ -37,15 +37,16 @@ class Numbered:
 
 
 def numbered(loop: Loop) -> Numbered | None:
-    """Return kind and numbers of a loop, or ``None`` where it is of a kind of its own: with complex poles, or odd numbers."""
+    """Return kind and numbers of a loop, or ``None`` where it is of a kind of its own: its numbers are no plain ones."""
     settings, process = loop.settings, loop.process
     dials = settings.values_by_name.values()
     numbers: list[Any] = [dial.value for dial in dials]
     numbers += (process.gain, process.delay)
+    signs = []
     for root in (*process.poles, *process.zeros):
-        if root.imag:
-            return None
-        numbers.append(root.real)
+        sign = 0 if not root.imag else 1 if root.imag > 0 else -1
+        signs.append(sign)
+        numbers += () if sign < 0 else (root.real, root.imag) if sign else (root.real,)
     stated: list[int | None] = []
     for name in _STATED:
         given = getattr(loop, name)
@@ -58,7 +59,7 @@ def numbered(loop: Loop) -> Numbered | None:
         settings.variant,
         *(settings.pv_range, settings.op_range, settings.pace, settings.lag, settings.scan),
         tuple((dial.name, dial.unit, dial.spans, dial.given, dial.active) for dial in dials),
-        *(len(process.poles), len(process.zeros), process.unit),
+        *(len(process.poles), tuple(signs), process.unit),
         *stated,
         loop.action,
     )
@@ -70,13 +71,24 @@ def with_numbers(loop: Loop, numbers: Sequence[Any]) -> Loop:
     left = iter(numbers)
     settings, process = loop.settings, loop.process
     values = {name: replace(dial, value=next(left)) for name, dial in settings.items()}
-    gain, delay, *roots = (next(left) for _ in range(2 + len(process.poles) + len(process.zeros)))
+    gain, delay = next(left), next(left)
     return replace(
         loop,
         settings=replace(settings, values_by_name=values),
-        process=process.with_numbers(gain, delay, roots),
+        process=process.with_numbers(gain, delay, list(_roots((*process.poles, *process.zeros), left))),
         **{name: _stated(getattr(loop, name), left) for name in _STATED},
     )
+
+
+def _roots(like: Sequence[complex], left: Iterator[Any]) -> Iterator[Any]:
+    """Yield roots of these kinds: real ones, and pairs of which the upper one comes first."""
+    upper: tuple[Any, Any] = (0.0, 0.0)
+    for root in like:
+        if not root.imag:
+            yield next(left)
+            continue
+        upper = (next(left), next(left)) if root.imag > 0 else (upper[0], -upper[1])
+        yield TracedRoot(*upper) if is_traced(*upper) else complex(*upper)
 
 
 def _stated(given: Any, left: Iterator[Any]) -> Any:
