@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import Any, Final
 
-from pidemu.columns.traced import isfinite
+from pidemu.columns.functions import isfinite
 from pidemu.errors import SettingError, UnitError
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number

@@ -14,7 +14,8 @@ from decimal import Decimal
 from numbers import Real
 from typing import Any, Final
 
-from pidemu.columns.traced import Traced, as_written, isfinite
+from pidemu.columns.functions import as_written, isfinite
+from pidemu.columns.traced import Traced
 from pidemu.errors import PidemuError
 from pidemu.excerpt import quoted
 

@@ -32,7 +32,7 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import Any, Final
 
-from pidemu.columns.traced import each, is_traced, isfinite, isinf, isnan, plain, sign_of
+from pidemu.columns.functions import each, is_traced, isfinite, isinf, isnan, plain, sign_of
 from pidemu.errors import UnitError, suggest
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number

@@ -11,10 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pidemu.columns.replay import Recording
-from pidemu.columns.traced import (
-    NotTracedError,
-    Tape,
+from pidemu.columns.functions import (
     as_written,
     each,
     exp,
@@ -30,6 +27,8 @@ from pidemu.columns.traced import (
     standing_for,
     whole,
 )
+from pidemu.columns.replay import Recording
+from pidemu.columns.traced import NotTracedError, Tape
 from pidemu.plausible import plain_number
 
 Computation = Callable[..., Sequence[Any]]

@@ -9,7 +9,7 @@ from pidemu import Process
 from pidemu.columns.replay import Recording
 from pidemu.columns.traced import Tape
 from pidemu.errors import ProcessError
-from pidemu.process.hold import sampled_columns
+from pidemu.process.hold_columns import sampled_columns
 
 LAGS = ((), (8.0,), (3.0, 40.0), (1.0, 1.0, 0.2), (0.01, 5.0, 600.0, 2.0))
 
@@ -35,9 +35,7 @@ def test_many_models_are_those_of_each_alone(leads: tuple[float, ...], integrato
         roots = np.array([[r.real for r in (*p.poles, *p.zeros)] for p in made]).reshape(40, -1).T
         n = len(made[0].poles)
         gains, delays = np.array([p.gain for p in made]), np.array([p.delay for p in made])
-        found, fits = sampled_columns(
-            n, [0] * len(roots), np.array([p.gain for p in made]), np.array([p.delay for p in made]), scans, *roots
-        )
+        found, fits = sampled_columns(n, [0] * len(roots), gains, delays, scans, *roots)
         assert fits.all()
         for p, h, row in zip(made, scans.tolist(), found, strict=True):
             s = p.sampled(h)

@@ -12,7 +12,7 @@ from pidemu.card.model.operation import Action, Arithmetic, Output
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint, SignalFilter
 from pidemu.card.model.terms import Derivative, Feedforward, Proportional
 from pidemu.card.transfer import Transfer
-from pidemu.columns.traced import exp
+from pidemu.columns.functions import exp
 from pidemu.errors import ScanError
 from pidemu.numeric import X
 

@@ -15,7 +15,7 @@ from pidemu.card.model.integral import Integral, IntegralLimits
 from pidemu.card.model.operation import Arithmetic, Output
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint, SignalFilter
 from pidemu.card.model.terms import Derivative, Feedforward, Filter, Proportional
-from pidemu.columns.traced import sqrt
+from pidemu.columns.functions import sqrt
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.numeric import X
 from pidemu.settings.settings import Settings

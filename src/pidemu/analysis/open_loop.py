@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pidemu.algorithm.model import Algorithm
 from pidemu.analysis.stability import unstable_continuous, unstable_sampled
 from pidemu.arrays import Floats
-from pidemu.columns.traced import sign_of
+from pidemu.columns.functions import sign_of
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process

@@ -14,7 +14,7 @@ from pidemu.arrays import Floats
 from pidemu.backends.comments import comment_text, python_head
 from pidemu.backends.expressions import literal, render
 from pidemu.backends.runner import Run, Runner
-from pidemu.columns.traced import is_traced, plain, single
+from pidemu.columns.functions import is_traced, plain, single
 from pidemu.program.ir import Program, Quantity, Structure, names_in
 from pidemu.program.precision import explicit
 from pidemu.program.specialise import specialise

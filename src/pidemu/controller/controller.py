@@ -15,7 +15,7 @@ from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record
 from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
-from pidemu.columns.traced import isfinite
+from pidemu.columns.functions import isfinite
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches

@@ -15,7 +15,7 @@ from pidemu.algorithm.model import Algorithm
 from pidemu.backends.choice import Choice, safe_runner
 from pidemu.backends.python import Compiled, compiled, in_precision
 from pidemu.backends.runner import Runner
-from pidemu.columns.traced import isfinite, isnan, plain
+from pidemu.columns.functions import isfinite, isnan, plain
 from pidemu.errors import ScanError
 from pidemu.program.ir import Program, StateRole
 

@@ -6,7 +6,8 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from pidemu.columns.traced import Traced, TracedRoot, is_traced
+from pidemu.columns.functions import is_traced
+from pidemu.columns.traced import Traced, TracedRoot
 from pidemu.fleet.loops import Loop
 
 _STATED: Final = ("scan", "setpoint", "load", "time", "output_limits", "initial")

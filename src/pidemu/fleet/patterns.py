@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from pidemu.arrays import Floats
 from pidemu.card.load import match_name
+from pidemu.columns.functions import standing_for
 from pidemu.columns.lots import KindOfComputation, Lot
 from pidemu.columns.replay import Recording
-from pidemu.columns.traced import NotTracedError, Tape, standing_for
+from pidemu.columns.traced import NotTracedError, Tape
 from pidemu.fleet.kinds import Kind, numbered
 from pidemu.fleet.rows import Row, RowReader, check_row
 from pidemu.settings.ranges import RANGES

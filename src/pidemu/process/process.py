@@ -16,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats
-from pidemu.columns.traced import sign_of
+from pidemu.columns.functions import is_traced, sign_of
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Rational, Response
 from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
 from pidemu.process.hold import SampledProcess, sample
+from pidemu.process.hold_columns import sampled_traced
 from pidemu.process.roots import count, factors, in_pairs, joined, poles_of, polynomial_of, zeros_of
 from pidemu.process.text import PERCENT, gain_unit, read
 from pidemu.settings.ranges import PERCENT as RANGE
@@ -222,7 +223,8 @@ class Process:
         ProcessError
             The interval is not a positive number, or an unstable process outgrows all numbers within it.
         """
-        return sample(self.gain, self.poles, self.zeros, self.delay, h)
+        sampled = sampled_traced if is_traced(self.gain, self.delay, h, *self.poles, *self.zeros) else sample
+        return sampled(self.gain, self.poles, self.zeros, self.delay, h)
 
     @cached_property
     def rational(self) -> Rational:

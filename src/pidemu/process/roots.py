@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
-from pidemu.columns.traced import Traced, isfinite
+from pidemu.columns.functions import isfinite
+from pidemu.columns.traced import Traced
 from pidemu.errors import ProcessError
 from pidemu.law.rational import multiply
 from pidemu.plausible import INTEGRATORS, PROCESS_TIME, ROOT, plausible, shown

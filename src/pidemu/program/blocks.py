@@ -13,7 +13,7 @@ from typing import Final
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
 from pidemu.card.model.signals import ErrorShape, SignalFilter
-from pidemu.columns.traced import exp, expm1
+from pidemu.columns.functions import exp, expm1
 from pidemu.program.ir import Assign, Binary, Expr, Floor, Name, Operand, Program, Quantity, equal, expr, names_in, select
 
 TINY: Final = 1e-300

@@ -13,7 +13,7 @@ import numpy as np
 
 from pidemu.algorithm.model import Algorithm, check_filters
 from pidemu.card.model.base import Rule
-from pidemu.columns.traced import each, isfinite
+from pidemu.columns.functions import each, isfinite
 from pidemu.errors import ScanError
 from pidemu.program.blocks import EXTRA_INPUTS, TINY, TINY_SINGLE, Builder
 from pidemu.program.dahlin import dahlin

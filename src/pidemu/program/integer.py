@@ -8,7 +8,7 @@ from typing import Final
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
-from pidemu.columns.traced import each, plain
+from pidemu.columns.functions import each, plain
 from pidemu.errors import ScanError
 from pidemu.program import blocks, output
 from pidemu.program.blocks import Builder

@@ -9,7 +9,7 @@ from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
 from pidemu.card.references import is_active
-from pidemu.columns.traced import isinf, isnan
+from pidemu.columns.functions import isinf, isnan
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, PlausibleSize, number, shown
 from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range

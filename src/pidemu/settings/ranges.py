@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
 
-from pidemu.columns.traced import plain
+from pidemu.columns.functions import plain
 from pidemu.errors import SettingError
 from pidemu.excerpt import quoted
 from pidemu.formatting import exactly
