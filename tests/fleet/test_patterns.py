@@ -127,6 +127,23 @@ def test_one_row_of_a_pattern_is_read_however_many_there_are(tmp_path: Path, mon
     )
 
 
+def test_a_table_is_run_and_written_without_its_loops_being_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = 'generic/standard,K={}; Ti={}; Td=0,"gain=1.2, lag={}, delay=2",0.5'
+    lines = [f"L{i},{row.format(1 + i / 700, 10 + i / 7, 20 + i / 3)}" for i in range(500)]
+    path = tmp_path / "loops.csv"
+    path.write_text("\n".join(["tag,card,settings,process,scan", *lines]), encoding="utf-8")
+    count = counted(monkeypatch)
+    found = read_loops(path)
+    result = pidemu.Fleet(found.loops).simulate(time=20.0, margins=False, engine="numpy")
+    found.write(tmp_path / "out.csv", result)
+    assert result.counts == {"done": 500}
+    assert count == [2]  # one whose reading, and one whose preparing is recorded
+    one = pidemu.Fleet(list(found.loops)[321:322]).simulate(time=20.0, margins=False, engine="python")
+    assert {name: x[321] for name, x in result.columns.items() if x[321] == x[321]} == {
+        name: x[0] for name, x in one.columns.items() if x[0] == x[0]
+    }
+
+
 def test_a_choice_that_looks_like_a_number_is_no_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     count = counted(monkeypatch)
     row = 'emerson/deltav,GAIN={}; RESET=9; RATE=1; STRUCTURE={},"gain=1, lag=9",0.5'

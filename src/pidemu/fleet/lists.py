@@ -49,6 +49,9 @@ class LoopList(Sequence[Loop]):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and len(self) == len(other) and all(map(operator.eq, self, other))
 
+    def __repr__(self) -> str:
+        return f"<{len(self):,} loops>"
+
     __hash__ = None  # type: ignore[assignment]  # of its loops, some may be written as they are asked for
 
     def chosen(self, which: Sequence[int]) -> LoopList:
