@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pidemu.columns.replay import Recording
+from pidemu.columns.traced import Tape
 from pidemu.errors import UnitError
 from pidemu.units import (
     UNITS,
@@ -18,10 +24,12 @@ from pidemu.units import (
     check_unit,
     convert_unit,
     from_canonical,
+    from_canonical_exactly,
     is_reciprocal,
     parse_quantity,
     parse_unit,
     to_canonical,
+    to_canonical_exactly,
 )
 
 
@@ -296,3 +304,34 @@ def test_one_kind_of_degree_becomes_another_whatever_the_range(
 def test_the_output_is_not_measured_in_degrees(role: Role, unit: str, other: str) -> None:
     with pytest.raises(UnitError, match=f"belongs to the output; use '{other}'"):
         check_unit(role, UNITS[unit])
+
+
+@pytest.mark.parametrize("role", list(Role))
+def test_a_dial_in_scans_is_the_same_at_a_traced_interval(role: Role) -> None:
+    numbers = np.array([[0.3, 7.0, 1e-3, 4.0], [0.1, 0.5, 3.0, 60.0]])
+    for unit in (unit for unit in UNITS.values() if unit.scans):
+        for convert in (to_canonical, from_canonical):
+            try:
+                expected = [convert(role, x, unit, Spans(16.0, 4.0, scan=h)) for x, h in numbers.T.tolist()]
+            except UnitError:  # it does not set this
+                continue
+            tape, first = Tape(), numbers[:, 0].tolist()
+            traced: Any = [tape.number(given) for given in first]
+            result = convert(role, traced[0], unit, Spans(16.0, 4.0, scan=traced[1]))
+            found, same = Recording.of(tape, first, [result]).replay(numbers)
+            assert same.all()
+            assert found[0].tolist() == expected
+
+
+@pytest.mark.parametrize("role", list(Role))
+def test_every_conversion_is_rounded_once(role: Role) -> None:
+    spans = Spans(3.7, 16.0, 0.3)
+    for old, new in itertools.product(UNITS.values(), repeat=2):
+        for x in (0.1, 7.0, 1e-300, 4 / 3, 1e300):
+            try:
+                found = convert_unit(role, x, old, new, spans)
+            except UnitError:
+                continue
+            degrees = replace(spans, degree=old.degree or new.degree)
+            exactly = from_canonical_exactly(role, to_canonical_exactly(role, Fraction(x), old, degrees), new, degrees)
+            assert found == (float(exactly) if exactly < 2**1024 else math.inf)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from typing import Any, Final
 
+from pidemu.columns.functions import isfinite
 from pidemu.errors import SettingError, UnitError
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number
@@ -90,7 +90,7 @@ def step(text: str) -> float | tuple[float, float]:
     when, comma, size = text.rpartition(",")
     try:
         found = (seconds(when), plain_number(size, words=True)) if comma else (0.0, plain_number(text, words=True))
-        if not all(map(math.isfinite, found)):
+        if not all(map(isfinite, found)):
             raise ValueError
     except (ValueError, SettingError):
         raise SettingError(

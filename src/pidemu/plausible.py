@@ -14,6 +14,8 @@ from decimal import Decimal
 from numbers import Real
 from typing import Any, Final
 
+from pidemu.columns.functions import as_written, isfinite
+from pidemu.columns.traced import Traced
 from pidemu.errors import PidemuError
 from pidemu.excerpt import quoted
 
@@ -80,6 +82,8 @@ def number(given: object) -> float:
     ValueError
         It is none, or too large or too small to compute with; the message says so.
     """
+    if isinstance(given, Traced):
+        return given  # type: ignore[return-value]  # it stands for a number that was read
     if isinstance(given, bool) or not isinstance(given, Real | Decimal):
         raise ValueError(f"{shown(given)} is not a number")
     try:
@@ -118,6 +122,9 @@ def plain_number(text: str, *, words: bool = False) -> float:
     ValueError: '1_0' is not a number; write digits and a decimal point only, such as 10 or 1.5e-3
     """
     text = text.strip(" \t")
+    traced = as_written(text)
+    if traced is not None:
+        return traced  # type: ignore[return-value]  # it stands for a number that is read
     if _PLAIN.fullmatch(text):
         value = float(text)
         if math.isinf(value):
@@ -155,7 +162,7 @@ def plausible(name: str, given: Any, quantity: PlausibleSize, error: type[Pidemu
     except ValueError as reason:
         remedy = f"{name} is {shown(given)}; give a number" if "is not" in str(reason) else f"{name}: {reason}"
         raise error(remedy) from None
-    if not math.isfinite(found):
+    if not isfinite(found):
         raise error(f"{name} is {found:g}; give a finite number")
     if not quantity.has(found):
         raise error(f"{name}: {quantity.refusal(f'{found:g} {quantity.unit}'.rstrip())}")

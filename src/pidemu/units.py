@@ -29,9 +29,10 @@ import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, Final
 
+from pidemu.columns.functions import each, is_traced, isfinite, isinf, isnan, plain, sign_of
 from pidemu.errors import UnitError, suggest
 from pidemu.excerpt import quoted
 from pidemu.plausible import plain_number
@@ -229,6 +230,10 @@ _PLAIN: Final = (Dimension.RATIO, Dimension.PERCENT)
 _INVERTED: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 
 
+_EXACT: Final = 2**53
+"""Whole numbers up to here are floats without rounding, so that one operation with them rounds once."""
+
+
 @cache
 def parse_unit(text: str) -> Unit:
     """Return the unit a person wrote: ``"rep/min"``, ``"minutes per repeat"``, ``"sec"``, ``"%"``.
@@ -405,31 +410,78 @@ def from_canonical_exactly(role: Role, value: Any, unit: Unit, spans: Spans) -> 
 
 
 @lru_cache(maxsize=4096)
-def _whole_numbers(role: Role, unit: Unit, spans: Spans, inward: bool) -> tuple[bool, int, int]:
-    """Return whether a dial is reciprocal, and numerator and denominator of the constant that converts it."""
-    check_unit(role, unit)
-    c, inverted = _constant(role, unit, spans), is_reciprocal(role, unit)
-    return (inverted, c.numerator, c.denominator) if inward or inverted else (inverted, c.denominator, c.numerator)
+def _known_constant(role: Role, unit: Unit, pv: float, op: float, scan: float | None, degree: Fraction | None) -> Fraction:
+    """Return `_constant`, which most dials of one card have in common."""
+    return _constant(role, unit, Spans(pv, op, scan, degree))
 
 
 def _convert(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
-    """Return a dial's value by its constant, rounded once: a quotient of whole numbers is."""
-    inverted, top, bottom = _whole_numbers(role, unit, spans, inward)
-    if math.isnan(value):
+    check_unit(role, unit)
+    value = plain(value) + 0.0  # no negative zero
+    if isnan(value):
         raise UnitError("not a number (NaN)")
-    if math.isinf(value):
-        return math.copysign(0.0 if inverted else math.inf, value)
+    inverted = is_reciprocal(role, unit)
+    if isinf(value):
+        return (0.0 if inverted else math.inf) * sign_of(value)
     if value == 0 and inverted:
         return math.inf
-    numerator, denominator = value.as_integer_ratio()
-    if inverted:
-        numerator, denominator = denominator, numerator
-    if denominator < 0:  # a negative value, turned over
-        numerator, denominator = -numerator, -denominator
+    if unit.scans and is_traced(spans.scan):
+        return _at_any_scan(role, value, unit, spans, inward=inward)
+    c = _known_constant(role, unit, spans.pv, spans.op, spans.scan if unit.scans else None, spans.degree)
+    return _over(c, value) if inverted else _times(c if inward else 1 / c, value)
+
+
+def _at_any_scan(role: Role, value: float, unit: Unit, spans: Spans, *, inward: bool) -> float:
+    """Return what a dial that counts in scans converts to, at a traced scan interval."""
+    c, twice = (_constant(role, unit, replace(spans, scan=h)) for h in (1.0, 2.0))
+    grows, inverted = twice > c, is_reciprocal(role, unit)  # in proportion to the interval, or to its reciprocal
+    if not inward and not inverted:
+        c, grows = 1 / c, not grows
+
+    def converted(x: float, h: float) -> float:
+        scans, parts = h.as_integer_ratio() if grows else h.as_integer_ratio()[::-1]
+        return (_quotient if inverted else _product)(c.numerator * scans, c.denominator * parts, x)
+
+    found: float = each(converted, value, spans.scan)
+    return found
+
+
+def _times(c: Fraction, x: float) -> float:
+    """Return a product, rounded once."""
+    if c == 1:
+        return x
+    if c.denominator == 1 and c <= _EXACT:
+        return x * float(c)
+    if c.numerator == 1 and c.denominator <= _EXACT:
+        return x / float(c.denominator)
+    product: float = each(partial(_product, c.numerator, c.denominator), x)
+    return product
+
+
+def _over(c: Fraction, x: float) -> float:
+    """Return a quotient, rounded once."""
+    if c.denominator == 1 and c <= _EXACT:
+        return float(c) / x
+    quotient: float = each(partial(_quotient, c.numerator, c.denominator), x)
+    return quotient
+
+
+def _product(numerator: int, denominator: int, x: float) -> float:
+    whole, parts = x.as_integer_ratio()
+    return _divided(numerator * whole, denominator * parts, x)
+
+
+def _quotient(numerator: int, denominator: int, x: float) -> float:
+    whole, parts = x.as_integer_ratio()
+    return _divided(numerator * parts, denominator * whole, x)
+
+
+def _divided(over: int, under: int, x: float) -> float:
+    """Return a quotient of whole numbers, which Python rounds once."""
     try:
-        return (top * numerator) / (bottom * denominator)
+        return over / under
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.copysign(math.inf, x)
 
 
 def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = FULL) -> float:
@@ -442,16 +494,20 @@ def convert_unit(role: Role, value: float, old: Unit, new: Unit, spans: Spans = 
     >>> convert_unit(Role.DEADBAND, 9, UNITS["degF"], UNITS["degC"])
     5.0
     """
+    value = plain(value) + 0.0  # no negative zero
     if spans.degree is None:  # two kinds of degree: the span is in one of them
         spans = replace(spans, degree=old.degree or new.degree)
-    if not math.isfinite(value) or (value == 0 and is_reciprocal(role, old)):
+    inverted = is_reciprocal(role, old), is_reciprocal(role, new)
+    if not isfinite(value) or (value == 0 and inverted[0]):
         return from_canonical(role, to_canonical(role, value, old, spans), new, spans)
     check_unit(role, old)
     check_unit(role, new)
-    canonical = _inward(role, Fraction(value), old, spans)
-    if canonical == 0 and is_reciprocal(role, new):
-        return math.inf
-    try:
-        return float(_outward(role, canonical, new, spans))
-    except OverflowError:
-        return math.copysign(math.inf, value)
+    c, d = _constant(role, old, spans), _constant(role, new, spans)
+    match inverted:
+        case (False, False):
+            return _times(c / d, value)
+        case (True, True):
+            return _times(d / c, value)
+        case (True, False):
+            return _over(c / d, value)
+    return math.inf if value == 0 else _over(d / c, value)

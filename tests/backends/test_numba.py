@@ -20,8 +20,8 @@ from pidemu.backends import cache, python
 from pidemu.backends import numba as target
 from pidemu.backends.python import starting
 from pidemu.checks.runs import plausible
-from pidemu.fleet.prepare import measured
 from pidemu.program.ir import Program
+from pidemu.simulation.measured import measured
 from pidemu.simulation.trial import trial
 
 SOURCE = Path(pidemu.__file__).parent.parent

@@ -21,6 +21,7 @@ from pidemu import Fleet, FleetError, FleetResult, Loop
 from pidemu.backends.cache import warn
 from pidemu.fleet import cluster as on_cluster
 from pidemu.fleet.cluster import run_chunk
+from pidemu.fleet.lists import PlacedLoops
 from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.progress import Progress
 from tests.fleet.support import alike, alone, check_signals, few
@@ -225,13 +226,13 @@ def test_a_loop_that_ends_whatever_runs_it_costs_itself_only(monkeypatch: pytest
     assert result.failures["L4"].startswith("the cluster could not run it: ")
 
 
-def deadly(chunk: list[Any], plan: FleetPlan) -> Any:
+def deadly(chunk: PlacedLoops, plan: FleetPlan) -> Any:
     if any(loop.tag == "L4" for _, loop in chunk):
         os._exit(1)
     return run_chunk(chunk, plan)
 
 
-def broken(chunk: list[Any], plan: FleetPlan) -> None:
+def broken(chunk: PlacedLoops, plan: FleetPlan) -> None:
     raise ValueError(f"{len(chunk)} loops too many")
 
 

@@ -8,7 +8,6 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,9 @@ from pidemu.backends.cache import warn
 from pidemu.backends.choice import Engine, block
 from pidemu.fleet import blocks, local, prepare
 from pidemu.fleet.blocks import COLUMNS
+from pidemu.fleet.group import Group, grouped
 from pidemu.fleet.judgement import RAN
+from pidemu.fleet.lists import LoopList, PlacedLoops
 from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import HEADER
@@ -82,7 +83,7 @@ def test_nor_do_the_ends_of_blocks_of_batches_and_of_stretches_in_time(engine: E
     assert max(loop.process.delay / 0.1 for loop in loops[:130]) > 64
     expected = [alone(loop, **STEPS) for loop in loops]
     monkeypatch.setattr(local, "_AT_ONCE", 50)
-    monkeypatch.setattr(local, "_SLICE", 7)
+    monkeypatch.setattr(prepare, "_SLICE", 7)
     monkeypatch.setattr(blocks, "_IN_CACHE", 1)  # 64 scans in one go
     result = Fleet(loops).simulate(**STEPS, keep=True, engine=engine)
     check_signals(result, loops, expected)
@@ -100,8 +101,8 @@ def test_the_error_counts_from_the_scan_of_the_load_step_on_or_from_the_first() 
 
 def test_loops_of_unlike_length_share_a_block_up_to_twice_the_scans() -> None:
     loops = [replace(loop, time=float(seconds)) for loop, seconds in zip(alike(6), (90, 10, 20, 21, 11, 50), strict=True)]
-    ready = [one for one in prepare.prepared(enumerate(loops), FleetPlan(), {}) if isinstance(one, prepare.Prepared)]
-    (group,) = prepare.grouped(ready)
+    ready = prepare.Preparation(FleetPlan()).prepared(PlacedLoops.of(enumerate(loops)))
+    (group,) = grouped(one for one in ready if isinstance(one, Group))
 
     def times(width: int, longer: int) -> list[list[int | None]]:
         return [[round(loops[m.place].time or 0) for m in part] for part in group.parts(width, longer)]
@@ -109,7 +110,7 @@ def test_loops_of_unlike_length_share_a_block_up_to_twice_the_scans() -> None:
     assert times(64, 2) == [[10, 11, 20], [21], [50, 90]]
     assert times(2, 2) == [[10, 11], [20, 21], [50, 90]]
     assert times(64, 1) == [[10], [11], [20], [21], [50], [90]]
-    assert group.scans == 69  # the mean of 21, 23, 41, 43, 101 and 181, rounded up
+    assert group.mean_scans == 69  # the mean of 21, 23, 41, 43, 101 and 181, rounded up
 
 
 def test_a_dead_time_longer_than_the_run_takes_no_room() -> None:
@@ -164,7 +165,7 @@ def test_an_interrupted_fleet_keeps_what_is_done(how: str, monkeypatch: pytest.M
     loops, names = alike(300, time=200.0), {t.name for t in threading.enumerate()}
     monkeypatch.setattr(local, "_AT_ONCE_KEPT", 32)
     done: list[int] = []
-    advance, real = Progress.advance, prepare.prepared
+    advance, real = Progress.advance, prepare.Preparation.prepared
 
     def interrupted(self: Progress, count: int) -> None:
         advance(self, count)
@@ -181,7 +182,7 @@ def test_an_interrupted_fleet_keeps_what_is_done(how: str, monkeypatch: pytest.M
         return real(*args)
 
     monkeypatch.setattr(Progress, "advance", interrupted)
-    monkeypatch.setattr(local, "prepared", prepared)
+    monkeypatch.setattr(prepare.Preparation, "prepared", prepared)
     result = Fleet(loops).simulate(engine="python", cores=2, keep=True)
     assert result.interrupted
     assert 0 < result.counts["done"] < 300
@@ -252,7 +253,7 @@ def test_the_table_reads_back_with_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_a_table_that_cannot_be_written_is_an_error_with_its_place(tmp_path: Path) -> None:
-    result = FleetResult(alike(1))
+    result = FleetResult(LoopList(alike(1)), FleetPlan())
     with pytest.raises(FleetError, match=r"no[/\\]table.csv: cannot be written: No such file or directory$"):
         result.write_table(tmp_path / "no" / "table.csv")
 
@@ -325,7 +326,7 @@ def test_an_engine_that_cannot_begin_is_replaced_by_plain_python(error: Exceptio
 def test_a_loop_that_fails_in_running_costs_itself_only(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     real = blocks.run_block
 
-    def run_block(members: Sequence[prepare.Prepared], *rest: Any) -> Any:
+    def run_block(members: Group, *rest: Any) -> Any:
         if any(m.tag == "L7" for m in members):
             raise error
         return real(members, *rest)

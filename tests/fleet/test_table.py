@@ -11,6 +11,7 @@ import pytest
 import pidemu
 from pidemu.card.library import builtin_folder
 from pidemu.errors import CardNotFoundError, FleetError
+from pidemu.fleet import rows as reading
 from pidemu.fleet import table
 from pidemu.fleet.result import HEADER
 from pidemu.fleet.table import LoopTable, read_loops
@@ -243,7 +244,7 @@ def test_whatever_a_row_raises_costs_that_row(error: Exception, tmp_path: Path, 
             raise error
         return real(name, *rest)
 
-    monkeypatch.setattr(table, "load_card_by_id", load_card)
+    monkeypatch.setattr(reading, "load_card_by_id", load_card)
     path = tmp_path / "loops.csv"
     rows = ('A,generic/standard,K=1; Ti=10,"gain=1,lag=9"', 'B,emerson/deltav,GAIN=1,"gain=1,lag=9"')
     path.write_text("tag,card,settings,process\n" + "\n".join(rows) + "\n", encoding="utf-8")

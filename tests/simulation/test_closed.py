@@ -21,7 +21,6 @@ from pidemu.card.library import card_files
 from pidemu.card.load import variants
 from pidemu.checks.runs import plausible
 from pidemu.errors import ProcessError, UndefinedError
-from pidemu.fleet.prepare import measured
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
 from pidemu.program.ir import names_in
@@ -29,6 +28,7 @@ from pidemu.program.specialise import specialise
 from pidemu.settings.settings import Settings
 from pidemu.simulation.closed import closed_loop
 from pidemu.simulation.experiment import FIGURES
+from pidemu.simulation.measured import measured
 from pidemu.simulation.simulate import simulate
 from pidemu.simulation.trial import Trial, trial
 from tests.helpers import scans_of, settings_of

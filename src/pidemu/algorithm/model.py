@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Generic, Literal, Self
 
@@ -13,6 +12,7 @@ from pidemu.card.model.operation import Action, Arithmetic, Output
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint, SignalFilter
 from pidemu.card.model.terms import Derivative, Feedforward, Proportional
 from pidemu.card.transfer import Transfer
+from pidemu.columns.functions import exp
 from pidemu.errors import ScanError
 from pidemu.numeric import X
 
@@ -52,8 +52,8 @@ class Dahlin:
         if self.delay / h > LONGEST_DELAY + 0.5:
             scans = f"{self.delay / h:.0f} scans of {h:g} s"
             raise ScanError(f"the dead time is {scans}, the most is {LONGEST_DELAY}; use a longer scan interval")
-        q = math.exp(-h / self.wanted) if self.wanted else 0.0
-        p = math.exp(-h / self.time) if self.time else 0.0
+        q = exp(-h / self.wanted) if self.wanted else 0.0
+        p = exp(-h / self.time) if self.time else 0.0
         if p == 1 or q == 1:
             raise ScanError(
                 f"a time of {max(self.time, self.wanted):g} s is too long for a scan interval of {h:g} s; use a longer one"

@@ -15,6 +15,7 @@ from pidemu.card.model.integral import Integral, IntegralLimits
 from pidemu.card.model.operation import Arithmetic, Output
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint, SignalFilter
 from pidemu.card.model.terms import Derivative, Feedforward, Filter, Proportional
+from pidemu.columns.functions import sqrt
 from pidemu.errors import SettingError, UndefinedError
 from pidemu.numeric import X
 from pidemu.settings.settings import Settings
@@ -138,7 +139,7 @@ class _Core(Generic[X]):
     def times(self) -> Mapping[str, Any]:
         """Times that a card names by a word [s] (specs/equations.md, section 5)."""
         both = abs(self.kd / self.ki) if self.read.settings.equation.form is Form.PARALLEL else abs(self.Ti * self.time)  # Ti Td
-        return {"Ti": self.Ti, "sqrt(Ti Td)": math.sqrt(both) if both else self.Ti}
+        return {"Ti": self.Ti, "sqrt(Ti Td)": sqrt(both) if both else self.Ti}
 
     def pick(self, given: str | float | None, default: float) -> Any:
         """Return a number that a card gives itself, or by the name of a setting."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from pidemu.algorithm.model import Algorithm
 from pidemu.analysis.stability import unstable_continuous, unstable_sampled
 from pidemu.arrays import Floats
+from pidemu.columns.functions import sign_of
 from pidemu.law.law import Law
 from pidemu.law.rational import Response
 from pidemu.process.process import Process
@@ -130,8 +131,8 @@ class OpenLoop:
 def low_frequency_sign(a: Algorithm) -> float:
     """Return the sign of a controller's action at low frequencies: of its integral, else proportional, else derivative gain."""
     if a.dahlin is not None:
-        return math.copysign(1.0, a.dahlin.gain)
-    return next((math.copysign(1.0, gain) for gain in (a.ki, a.kp, a.kd) if gain), 0.0)
+        return sign_of(a.dahlin.gain)
+    return next((sign_of(gain) for gain in (a.ki, a.kp, a.kd) if gain), 0.0)
 
 
 def _corners(loop: OpenLoop) -> list[float]:

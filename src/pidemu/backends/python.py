@@ -14,6 +14,7 @@ from pidemu.arrays import Floats
 from pidemu.backends.comments import comment_text, python_head
 from pidemu.backends.expressions import literal, render
 from pidemu.backends.runner import Run, Runner
+from pidemu.columns.functions import is_traced, plain, single
 from pidemu.program.ir import Program, Quantity, Structure, names_in
 from pidemu.program.precision import explicit
 from pidemu.program.specialise import specialise
@@ -188,7 +189,7 @@ def compiled(program: Program) -> Compiled:
     program : Program
         The program.
     """
-    bind, read = _bound(program.structure)
+    bind, read = _bound(program.structure, is_traced(*program.values, *program.initial))
     coefficients = (q.name for q in program.coefficients)
     values = [in_precision(program, name, x) for name, x in zip(coefficients, program.values, strict=True)]
     scan, run, run_automatic = bind(*values)
@@ -196,13 +197,13 @@ def compiled(program: Program) -> Compiled:
 
 
 @lru_cache(maxsize=512)
-def _bound(structure: Structure) -> tuple[Callable[..., Any], tuple[str, ...]]:
+def _bound(structure: Structure, traced: bool = False) -> tuple[Callable[..., Any], tuple[str, ...]]:
     """Return what makes functions of the coefficients' values, and what the one for automatic scans reads."""
     program = structure.bare()
     automatic = specialise(program)
     names: dict[str, Any] = {}
     if program.precision == "float32":
-        names = {"float32": np.float32, "float64": np.float64}
+        names = {"float32": single, "float64": plain} if traced else {"float32": np.float32, "float64": np.float64}
     exec(_text(program, automatic), names)  # our own text: nothing of the user's goes into it
     return names["bind"], tuple(q.name for q in automatic.inputs)
 
@@ -227,6 +228,8 @@ def in_precision(program: Program, name: str, value: float) -> float:
     """Return a value in the precision of a name of the program."""
     if program.precision == "float64":
         return value
+    if is_traced(value):
+        return plain(value) if program.is_wide(name) else single(value)  # type: ignore[no-any-return]
     with np.errstate(over="ignore"):
         return np.float64(value) if program.is_wide(name) else np.float32(value)  # type: ignore[return-value]  # stands in
 

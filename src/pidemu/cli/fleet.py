@@ -152,9 +152,9 @@ def _tell_faults(loops: LoopTable, result: FleetResult | None, verbose: bool) ->
     """Say on stderr, line by line, which rows and loops could not be run; with `verbose`, how their settings were read."""
     found = [(wrong.line, wrong.tag, wrong.reason) for wrong in loops.wrong]
     if result is not None:
-        for loop, line, reason in zip(loops.loops, loops.lines, result.reasons, strict=True):
-            notes = [f"note: {note}" for note in loop.settings.notes] if verbose else []
-            found += [(line, loop.tag, message) for message in (*notes, *([reason] if reason else []))]
+        for i, (tag, line, reason) in enumerate(zip(loops.loops.tags, loops.lines, result.reasons, strict=True)):
+            notes = [f"note: {note}" for note in loops.loops[i].settings.notes] if verbose else []
+            found += [(line, tag, message) for message in (*notes, *([reason] if reason else []))]
     for line, tag, message in sorted(found, key=lambda one: one[0]):
         echo(loops.located(line, tag, message), err=True)
 

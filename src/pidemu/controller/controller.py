@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import isnan, nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, Engine, checked, for_record
 from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
+from pidemu.columns.functions import isfinite
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches
@@ -243,7 +244,7 @@ class Controller:
         sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
-        last = self._running.rest(float(sp), float(pv), float(output))
+        last = self._running.rest(sp, pv, output)
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
 

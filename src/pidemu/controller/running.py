@@ -6,15 +6,16 @@ import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import nan
 from typing import Any, Final
 
 import numpy as np
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.backends.choice import Choice, safe_runner
-from pidemu.backends.python import Compiled, compiled
+from pidemu.backends.python import Compiled, compiled, in_precision
 from pidemu.backends.runner import Runner
+from pidemu.columns.functions import isfinite, isnan, plain
 from pidemu.errors import ScanError
 from pidemu.program.ir import Program, StateRole
 
@@ -92,20 +93,20 @@ class Running:
         return name in self._places
 
     def __getitem__(self, name: str) -> float:
-        return float(self.state[self._places[name]])
+        found: float = plain(self.state[self._places[name]])
+        return found
 
     def __setitem__(self, name: str, value: float) -> None:
         """Set a state, in the program's precision."""
-        place = self._places[name]
-        self.state[place] = type(self.compiled.initial[place])(value)
+        self.state[self._places[name]] = in_precision(self.program, name, plain(value))
 
     def named(self) -> dict[str, float]:
         """Return the states by name."""
-        return {name: float(self.state[place]) for name, place in self._places.items()}
+        return {name: plain(self.state[place]) for name, place in self._places.items()}
 
     def not_finite(self, state: Sequence[float] | None = None) -> dict[str, float]:
         """Return the states that are not finite numbers, by name; of these states, or of the present ones."""
-        return {name: float(x) for name, x in zip(self._places, state or self.state, strict=True) if not isfinite(x)}
+        return {name: plain(x) for name, x in zip(self._places, state or self.state, strict=True) if not isfinite(x)}
 
     def inputs(self, last: Mapping[str, float]) -> tuple[float, ...]:
         """Return the program's inputs from signals by name; what is missing is no signal."""
@@ -119,7 +120,8 @@ class Running:
         """Return what the next scan would compute under a name; nothing changes."""
         functions = self.compiled if name == StateRole.OUTPUT else compiled(replace(self.program, output=name))
         with self.quiet():
-            return float(functions.scan(list(self.state), *self.inputs(last)))
+            found: float = plain(functions.scan(list(self.state), *self.inputs(last)))
+        return found
 
     def computes(self, name: str) -> bool:
         """Tell whether the program computes something under a name."""

@@ -12,7 +12,7 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice
 from pidemu.backends.runner import Block
-from pidemu.fleet.prepare import Prepared
+from pidemu.fleet.group import Group
 from pidemu.simulation.experiment import FIGURES, integral_of_error
 from pidemu.simulation.outcome import late_scan
 from pidemu.simulation.simulate import run_trial
@@ -33,7 +33,7 @@ class BlockOutcome:
 
     Attributes
     ----------
-    members : tuple of Prepared
+    members : Group
         The loops.
     columns : dict of str to ndarray, shape (loops,)
         What `COLUMNS` names.
@@ -47,7 +47,7 @@ class BlockOutcome:
         The NumPy file that holds the records, where they are kept in files.
     """
 
-    members: tuple[Prepared, ...]
+    members: Group
     columns: dict[str, Floats]
     records: Floats | None
     engine: Choice
@@ -60,7 +60,7 @@ class Stopped(Exception):  # noqa: N818 (no error)
 
 
 def run_block(
-    members: Sequence[Prepared],
+    members: Group,
     engine: Choice,
     function: Block,
     width: int,
@@ -71,7 +71,7 @@ def run_block(
 
     Parameters
     ----------
-    members : sequence of Prepared
+    members : Group
         At most `width` loops of one structure, in the order of their numbers of scans.
     engine : Choice
         What runs them, for the record.
@@ -89,17 +89,18 @@ def run_block(
     Stopped
         It said so.
     """
-    structure, scans = members[0].structure, members[-1].trial.scans
-    filled = [*members, *[members[-1]] * (width - len(members))]
-    values, states = (np.array([getattr(m, what) for m in filled]).T.copy() for what in ("values", "initial"))
-    under_way = [[min(n, m.trial.scans) for n in m.lengths] for m in filled]  # what comes later than the last scan is not seen
-    lengths = np.array(under_way, dtype=np.int64).reshape(width, -1).T.copy()
+    structure, numbers = members.structure, members.columns
+    ends = members.scans.tolist()
+    scans = ends[-1]
+    filled = np.minimum(np.arange(width), len(members) - 1)
+    values, states = (x[filled].T.copy() for x in (numbers.values, numbers.initial))
+    under_way = np.minimum(numbers.lengths, numbers.scans[:, None])  # what comes later than the last scan is not seen
+    lengths = under_way[filled].T.astype(np.int64)
     rings = np.zeros((len(lengths), int(lengths.max(initial=0)) + 1, width))
     at_once = min(scans, max(64, _IN_CACHE // width))
     shape = (len(structure.recorded), scans, width)
     records = None if room is None else room(shape)
     buffer = np.empty((shape[0], at_once, width)) if records is None else None
-    ends = [m.trial.scans for m in members]
     places = [structure.states.index(name) for name in (*FIGURES, "error_was")]
     columns = np.empty((len(places), len(members)))
     done = 0
@@ -114,7 +115,7 @@ def run_block(
             columns[:, done] = states[places, done]
             done += 1
     found = dict(zip(COLUMNS, columns, strict=True))
-    return BlockOutcome(tuple(members), found, records, engine, frozenset(_mend(members, found, records)))
+    return BlockOutcome(members, found, records, engine, frozenset(_mend(members, found, records)))
 
 
 def _spans(ends: Sequence[int], at_once: int) -> Iterator[tuple[int, int]]:
@@ -126,18 +127,17 @@ def _spans(ends: Sequence[int], at_once: int) -> Iterator[tuple[int, int]]:
             at = min(at + at_once, end)
 
 
-def _mend(members: Sequence[Prepared], columns: dict[str, Floats], records: Floats | None) -> list[int]:
+def _mend(members: Group, columns: dict[str, Floats], records: Floats | None) -> list[int]:
     """Run loops again, scan by scan, whose measurement outgrew all numbers: what the card does then is not in its program."""
     away = []
-    for i, member in enumerate(members):
-        if all(np.isfinite(column[i]) for column in columns.values()):
-            continue
-        pv, out, _ = run_trial(member.trial)
-        for name, value in figures_of(member.trial, pv, out).items():
+    for i in np.flatnonzero(~np.isfinite(list(columns.values())).all(axis=0)).tolist():
+        trial = members.trial(int(members.places[i]))
+        pv, out, _ = run_trial(trial)
+        for name, value in figures_of(trial, pv, out).items():
             columns[name][i] = value
         if records is not None:
-            records[:, : member.trial.scans, i] = out, pv
-        away.append(member.place)
+            records[:, : trial.scans, i] = out, pv
+        away.append(int(members.places[i]))
     return away
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import itertools
 import socket
 import time
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -16,6 +15,7 @@ import numpy as np
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome
+from pidemu.fleet.lists import PlacedLoops
 from pidemu.fleet.local import outcomes
 from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.prepare import Failed
@@ -72,10 +72,10 @@ class _Chunks:
 
     def __init__(self, distributed: Any, client: Any, loops: Iterable[Numbered], plan: FleetPlan, worker_timeout: float) -> None:
         self._distributed, self._client, self._plan = distributed, client, plan
-        self._loops, self._size = iter(loops), _FIRST
-        self._under_way: dict[Any, list[Numbered]] = {}
-        self._halves: list[list[Numbered]] = []
-        self._suspects: list[Numbered] = []
+        self._loops, self._size, self._next_one = PlacedLoops.of(loops), _FIRST, 0
+        self._under_way: dict[Any, PlacedLoops] = {}
+        self._halves: list[PlacedLoops] = []
+        self._suspects: list[PlacedLoops] = []
         self._alone: set[int] = set()
         self._workers = _Workers(client, worker_timeout)
 
@@ -94,8 +94,8 @@ class _Chunks:
                     self._size = _next_size(self._size, len(chunk), seconds)
                 if self._client.status == "running":
                     done.update(self._submitted())
-            left = itertools.chain(*self._under_way.values(), *self._halves, self._suspects, self._loops)
-            yield from (Failed(place, self._workers.fault or _LOST) for place, _ in left)
+            left = (*self._under_way.values(), *self._halves, *self._suspects, self._loops[self._next_one :])
+            yield from (Failed(place, self._workers.fault or _LOST) for chunk in left for place in chunk.places)
         finally:
             if self._client.status == "running":
                 self._client.cancel(list(self._under_way))
@@ -109,16 +109,18 @@ class _Chunks:
             self._under_way[new[-1]] = chunk
         return new
 
-    def _next(self) -> list[Numbered]:
+    def _next(self) -> PlacedLoops:
+        """Return the next chunk: of a table its rows and their numbers, of which a worker makes what it needs."""
         if self._halves:
             return self._halves.pop()
-        chunk = list(itertools.islice(self._loops, self._size))
+        chunk = self._loops[self._next_one : self._next_one + self._size]
+        self._next_one += len(chunk)
         if not chunk and not self._under_way and self._suspects:
-            chunk = [self._suspects.pop()]
-            self._alone.add(chunk[0][0])
+            chunk = self._suspects.pop()
+            self._alone.add(chunk.places[0])
         return chunk
 
-    def _is_tried_again(self, chunk: list[Numbered]) -> bool:
+    def _is_tried_again(self, chunk: PlacedLoops) -> bool:
         """Tell whether loops whose workers were killed get another chance: halves of them, and at the end each with nothing beside.
 
         One of them may end whatever runs it, and takes with it what the same worker is at; the others are not to fail for it.
@@ -126,8 +128,8 @@ class _Chunks:
         middle = len(chunk) // 2
         if middle:
             self._halves += [chunk[:middle], chunk[middle:]]
-        elif chunk[0][0] not in self._alone:
-            self._suspects += chunk
+        elif chunk.places[0] not in self._alone:
+            self._suspects.append(chunk)
         else:
             return False
         return True
@@ -178,12 +180,12 @@ def _address(client: Any) -> str:
     return str(client.scheduler.address) if client.scheduler is not None else "the cluster"
 
 
-def run_chunk(chunk: Sequence[Numbered], plan: FleetPlan) -> tuple[list[BlockOutcome | Failed], float]:
+def run_chunk(chunk: PlacedLoops, plan: FleetPlan) -> tuple[list[BlockOutcome | Failed], float]:
     """Run loops on a worker; return what came of them, and how long it took [s].
 
     Parameters
     ----------
-    chunk : sequence of (int, Loop)
+    chunk : PlacedLoops
         Loops with their places in the fleet.
     plan : FleetPlan
         What is done to them.
@@ -194,10 +196,10 @@ def run_chunk(chunk: Sequence[Numbered], plan: FleetPlan) -> tuple[list[BlockOut
 
 
 def _light(one: BlockOutcome | Failed) -> BlockOutcome | Failed:
-    """Return what is sent back: the trials and what came of them, without the programs' numbers."""
+    """Return what is sent back: what came of the loops, without the numbers of their programs."""
     if isinstance(one, Failed):
         return one
-    return replace(one, members=tuple(replace(m, structure=None, values=(), initial=()) for m in one.members))  # type: ignore[arg-type]
+    return replace(one, members=one.members.light())
 
 
 Taken = tuple[list[BlockOutcome | Failed], float]
@@ -212,10 +214,10 @@ def _taken(future: Any) -> Taken | Exception:
     return taken
 
 
-def _result(taken: Taken | Exception, chunk: list[Numbered]) -> Taken:
+def _result(taken: Taken | Exception, chunk: PlacedLoops) -> Taken:
     """Return what a chunk gave; where it could not be run at all, why, for each of its loops."""
     if isinstance(taken, Exception):
-        return [Failed(place, f"the cluster could not run it: {taken}") for place, _ in chunk], _SECONDS
+        return [Failed(place, f"the cluster could not run it: {taken}") for place in chunk.places], _SECONDS
     return taken
 
 

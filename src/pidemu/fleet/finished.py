@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pidemu import __version__
 from pidemu.fleet.blocks import COLUMNS, BlockOutcome
-from pidemu.fleet.judgement import MARGINS, RAN, Judgement, judgement
+from pidemu.fleet.judgement import MARGINS, RAN, Judgement, judgements
 from pidemu.fleet.loops import FleetPlan, Loop
 
 FIELDS: Final = ("scan", "scans", "status", *COLUMNS, "settled", "stable", *MARGINS, "engine", "key")
@@ -78,14 +78,14 @@ def finished(outcome: BlockOutcome, known: Sequence[str]) -> list[Finished]:
     return [
         Finished(
             m.tag,
-            m.trial.scan,
-            m.trial.scans,
+            m.scan,
+            m.scans,
             {name: column[i] for name, column in columns.items()},
-            judgement(outcome, i),
+            judged,
             outcome.engine.engine,
             known[m.place],
         )
-        for i, m in enumerate(outcome.members)
+        for i, (m, judged) in enumerate(judgements(outcome))
     ]
 
 
@@ -142,7 +142,7 @@ def _key(loop: Loop, plan: FleetPlan, equations: dict[int, str]) -> str:
         equations[id(variant)],
         [(name, v.value, v.unit, v.spans) for name, v in settings.items()],
         (settings.pv_range, settings.op_range, settings.pace, settings.lag, settings.scan),
-        (process.gain, tuple(process.poles), tuple(process.zeros), process.delay),
+        (process.gain, [complex(p) for p in process.poles], [complex(z) for z in process.zeros], process.delay),
         (loop.scan, loop.action, loop.output_limits, loop.initial, said, plan.margins),
     )
     return hashlib.sha256(repr(what).encode(errors="backslashreplace")).hexdigest()[:_LENGTH]

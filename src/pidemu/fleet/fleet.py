@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,9 @@ from pidemu.backends.choice import Engine, checked
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import keys
+from pidemu.fleet.lists import PlacedLoops, unique
 from pidemu.fleet.local import outcomes
-from pidemu.fleet.loops import FleetPlan, Loop, unique
+from pidemu.fleet.loops import FleetPlan, Loop
 from pidemu.fleet.prepare import Failed
 from pidemu.fleet.progress import Progress
 from pidemu.fleet.result import FleetResult
@@ -117,9 +117,9 @@ class Fleet:
         """
         if cores is not None and cores < 1:
             raise FleetError(f"{cores} cores cannot run anything; give at least 1")
-        result = FleetResult(self.loops)
         keeps = keep or folder is not None or parquet is not None
         plan = FleetPlan(setpoint, load, time, keeps, checked(engine), margins)
+        result = FleetResult(self.loops, plan)
         try:
             with contextlib.ExitStack() as stack:
                 store = stack.enter_context(SignalStore(keep, folder, parquet, resume)) if keeps or resume else None
@@ -133,18 +133,19 @@ class Fleet:
             result.interrupted = True
         return result
 
-    def _left(self, result: FleetResult, plan: FleetPlan, store: SignalStore | None) -> list[tuple[int, Loop]]:
+    def _left(self, result: FleetResult, plan: FleetPlan, store: SignalStore | None) -> PlacedLoops:
         """Return the loops that are to be run, with their places; the result takes those that an earlier run had done."""
         done: set[int] = set()
         if store is not None:
-            for place, one, signals in store.begin([loop.tag for loop in self.loops], keys(self.loops, plan)):
-                result.resume(place, one, signals, functools.partial(plan.trial, self.loops[place]))
+            for place, one, signals in store.begin(list(self.loops.tags), keys(self.loops.quickly(), plan)):
+                result.resume(place, one, signals)
                 done.add(place)
-        return [(place, loop) for place, loop in enumerate(self.loops) if place not in done]
+        left = [place for place in range(len(self.loops)) if place not in done]
+        return PlacedLoops(self.loops.chosen(left) if done else self.loops, left)
 
     def _outcomes(
         self,
-        loops: list[tuple[int, Loop]],
+        loops: PlacedLoops,
         plan: FleetPlan,
         cores: int | None,
         cluster: Any,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
 from pidemu.fleet.blocks import BlockOutcome
-from pidemu.simulation.outcome import settled_by, stability_of
+from pidemu.fleet.group import Prepared
+from pidemu.simulation.outcome import settled
 
 Status = Literal["done", "unstable", "ran away", "failed", "not run"]
 RAN: Final[tuple[Status, ...]] = ("done", "unstable", "ran away")
@@ -39,19 +40,18 @@ class Judgement:
     margins: Mapping[str, float]
 
 
-def judgement(found: BlockOutcome, lane: int) -> Judgement:
-    """Return how a loop of a block ended.
+def judgements(found: BlockOutcome) -> Iterator[tuple[Prepared, Judgement]]:
+    """Yield the loops of a block, and how each ended.
 
     Parameters
     ----------
     found : BlockOutcome
         What came of the block.
-    lane : int
-        The loop's number in it.
     """
-    member = found.members[lane]
-    m = member.margins
-    stable = stability_of(member.trial, m)
-    status: Status = "ran away" if member.place in found.ran_away else "unstable" if stable is False else "done"
-    settled = settled_by(member.trial, {name: float(found.columns[name][lane]) for name in ("swing", "peak")})
-    return Judgement(status, settled, stable, {} if m is None else {name: getattr(m, name) for name in MARGINS})
+    ends = zip(found.members, found.columns["swing"].tolist(), found.columns["peak"].tolist(), strict=True)
+    for member, swing, peak in ends:
+        m, away = member.margins, member.place in found.ran_away
+        status: Status = "ran away" if away else "unstable" if member.stable is False else "done"
+        is_settled = settled((member.scans - 1) * member.scan, member.answer, swing, peak)
+        margins = {} if m is None else {name: getattr(m, name) for name in MARGINS}
+        yield member, Judgement(status, is_settled, member.stable, margins)

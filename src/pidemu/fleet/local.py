@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import queue
 import threading
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
@@ -13,10 +12,11 @@ from pidemu.backends.choice import Choice, block, for_loops, instead, one_by_one
 from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block
+from pidemu.fleet.group import Group, grouped
+from pidemu.fleet.lists import PlacedLoops
 from pidemu.fleet.loops import FleetPlan, Loop
-from pidemu.fleet.prepare import Failed, Group, Prepared, grouped, prepared, reason_of
+from pidemu.fleet.prepare import Failed, Preparation, reason_of
 from pidemu.processes import processors
-from pidemu.program.ir import Structure
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
 """Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""
@@ -31,8 +31,6 @@ _WORK: Final = 2**22
 """Loops times scans of a block whose signals are kept: some 3 s in plain Python. A run that is killed loses them."""
 _NARROWEST: Final = {"numpy": 1024, "numba": 64}
 """Loops below which a block is not made narrower: half as wide, these engines take longer for the same (1.6 and 2 times)."""
-_SLICE: Final = 128
-"""Loops that are prepared from one look at what is done to the next."""
 _LOOK: Final = 0.5
 """Seconds after which a wait begins anew: where the system does not interrupt one, Ctrl-C is seen then."""
 
@@ -58,16 +56,14 @@ def outcomes(
     count = cores or processors()
     threads = _Threads(count, plan, room)
     try:
-        source = iter(loops)
-        while some := list(itertools.islice(source, _AT_ONCE if room is None else _AT_ONCE_KEPT)):
-            ready: list[Prepared] = []
-            shared: dict[Structure, Structure] = {}
-            for start in range(0, len(some), _SLICE):
-                for found in prepared(some[start : start + _SLICE], plan, shared):
-                    if isinstance(found, Failed):
-                        yield found
-                    else:
-                        ready.append(found)
+        all_of_them, at_once, preparation = PlacedLoops.of(loops), _AT_ONCE if room is None else _AT_ONCE_KEPT, Preparation(plan)
+        for start in range(0, len(all_of_them), at_once):
+            ready: list[Group] = []
+            for found in preparation.prepared(all_of_them[start : start + at_once]):
+                if isinstance(found, Failed):
+                    yield found
+                else:
+                    ready.append(found)
                 yield from threads.done()
             yield from threads.done(2 * count)
             for group in grouped(ready):
@@ -93,7 +89,7 @@ class _Threads:
         choice, function, width = self._engine(group)
         if choice.engine in _ONE_AT_A_TIME:
             function = _in_turn(function)
-        widest = width if self._room is None else min(width, max(_NARROWEST.get(choice.engine, 1), _WORK // group.scans))
+        widest = width if self._room is None else min(width, max(_NARROWEST.get(choice.engine, 1), _WORK // group.mean_scans))
         for part in group.parts(widest, 2 if choice.engine in _SIDE_BY_SIDE else 1):
             lanes = width if choice.engine == "numba" else len(part)
             self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
@@ -103,13 +99,13 @@ class _Threads:
         """Return what runs a group; one that cannot even begin is replaced."""
         asked = self._plan.engine
         try:
-            choice = for_loops(group.structure, group.scans, len(group.members), asked)
+            choice = for_loops(group.structure, group.mean_scans, len(group), asked)
             return choice, *block(group.structure, choice.engine)
         except Exception as error:
             choice = instead(asked or "numba", error)
             return choice, *block(group.structure, choice.engine)
 
-    def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> list[BlockOutcome | Failed]:
+    def _run(self, part: Group, choice: Choice, function: Block, width: int) -> list[BlockOutcome | Failed]:
         if self._free is not None:
             self._free.acquire()
         try:
@@ -118,18 +114,18 @@ class _Threads:
             raise
         except Exception as error:
             if (choice.engine, len(part)) == ("python", 1):
-                return [Failed(part[0].place, reason_of(error))]
-            return [self._alone(member, instead(choice.engine, error)) for member in part]
+                return [Failed(int(part.places[0]), reason_of(error))]
+            return [self._alone(part.chosen([i]), instead(choice.engine, error)) for i in range(len(part))]
 
-    def _alone(self, member: Prepared, choice: Choice) -> BlockOutcome | Failed:
+    def _alone(self, member: Group, choice: Choice) -> BlockOutcome | Failed:
         """Run a loop of a block that failed, in plain Python: what was wrong with one of them is no matter to the others."""
         function = _in_turn(one_by_one(member.structure, choice.engine))
         try:
-            return run_block([member], choice, function, 1, self._room, self._stop.is_set)
+            return run_block(member, choice, function, 1, self._room, self._stop.is_set)
         except (Stopped, FleetError):
             raise
         except Exception as error:
-            return Failed(member.place, reason_of(error))
+            return Failed(int(member.places[0]), reason_of(error))
 
     def done(self, most: int | None = None) -> Iterator[BlockOutcome | Failed]:
         """Yield what is done; wait until at most so many blocks are left, or not at all."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from pidemu.backends.choice import Engine
-from pidemu.errors import FleetError
 from pidemu.process.process import Process
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
@@ -95,22 +93,3 @@ class FleetPlan:
             output_limits=loop.output_limits,
             initial=loop.initial,
         )
-
-
-def unique(loops: Iterable[Loop]) -> tuple[Loop, ...]:
-    """Return the loops as a tuple.
-
-    Raises
-    ------
-    FleetError
-        There are none, or two have the same tag.
-    """
-    found = tuple(loops)
-    if not found:
-        raise FleetError("a fleet has no loops; give at least one")
-    seen: set[str] = set()
-    for loop in found:
-        if loop.tag in seen:
-            raise FleetError(f"two loops have the tag '{loop.tag}'; give each its own")
-        seen.add(loop.tag)
-    return found

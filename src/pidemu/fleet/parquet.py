@@ -141,11 +141,11 @@ class ParquetFile:
         assert outcome.records is not None
         records = [one.row for one in rows]
         columns: dict[str, Any] = {
-            "tag": [m.tag for m in outcome.members],
-            "card": [m.trial.settings.card.id for m in outcome.members],
+            "tag": outcome.members.tags,
+            "card": outcome.members.cards,
             **{name: [row[name] for row in records] for name in FIELDS},
             **{
-                name: [outcome.records[k, : m.trial.scans, i] for i, m in enumerate(outcome.members)]
+                name: [outcome.records[k, :scans, i] for i, scans in enumerate(outcome.members.scans.tolist())]
                 for k, name in enumerate(_SIGNALS)
             },
         }

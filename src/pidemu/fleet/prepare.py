@@ -1,51 +1,34 @@
-"""Loops as programs, grouped by what they have in common."""
+"""Loops made ready to run: one by one, or all of a kind at once; both ways give the same numbers.
+
+The single way builds the program of a loop, which takes a millisecond. Of a kind of loops one is prepared so and recorded, and the
+others' numbers are computed as its were (`pidemu.fleet.recorded`). Where guards say that a loop has another structure, it begins a
+recording of its own, or is prepared alone.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import gc
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Final
 
-from pidemu.analysis.loop_figures import LoopFigures
+import numpy as np
+
+from pidemu.columns.lots import KindOfComputation, Lot
 from pidemu.errors import PidemuError
-from pidemu.fleet.loops import FleetPlan, Loop
-from pidemu.program.ir import Program, Structure
-from pidemu.simulation.experiment import Measuring, Steps, experiment
-from pidemu.simulation.outcome import late_scan, margins_if_any
+from pidemu.fleet.group import Group
+from pidemu.fleet.lists import PlacedLoops
+from pidemu.fleet.loops import FleetPlan
+from pidemu.fleet.recorded import PreparedColumns, RecordedLoop, record
+from pidemu.program.ir import Structure
+from pidemu.simulation.measured import measured
+from pidemu.simulation.outcome import last_answer, margins_if_any, stability_of
 from pidemu.simulation.trial import Trial
 
-
-@dataclass(frozen=True)
-class Prepared:
-    """A loop ready to run: the numbers of its program.
-
-    Attributes
-    ----------
-    place : int
-        Its place in the fleet.
-    tag : str
-        Its name.
-    trial : Trial
-        What runs.
-    structure : Structure
-        What its program shares with others.
-    values, initial : tuple of float
-        Coefficients, and states before the first scan.
-    lengths : tuple of int
-        Scans that each delay line delays by.
-    margins : LoopFigures or None
-        Margins of the sampled loop, where they were asked for and there are any.
-    """
-
-    place: int
-    tag: str
-    trial: Trial
-    structure: Structure
-    values: tuple[float, ...]
-    initial: tuple[float, ...]
-    lengths: tuple[int, ...]
-    margins: LoopFigures | None = None
+_SLICE: Final = 64
+"""Loops that are prepared one by one from one look at what is done to the next."""
 
 
 @dataclass(frozen=True)
@@ -64,70 +47,80 @@ class Failed:
     reason: str
 
 
-@dataclass(frozen=True)
-class Group:
-    """Loops that share a structure.
-
-    Attributes
-    ----------
-    structure : Structure
-        What their programs have in common.
-    members : tuple of Prepared
-        The loops, by number of scans and dead time, so that those of a block take equally long and have delay lines of like length.
-    """
-
-    structure: Structure
-    members: tuple[Prepared, ...]
-
-    @property
-    def scans(self) -> int:
-        """How many scans a loop does on average, rounded up."""
-        return -(-sum(m.trial.scans for m in self.members) // len(self.members))
-
-    def parts(self, width: int, longer: int) -> Iterator[tuple[Prepared, ...]]:
-        """Yield the loops of one block after the other; a block runs until its last loop is done.
-
-        Parameters
-        ----------
-        width : int
-            At most so many loops in a block.
-        longer : int
-            None has more than so many times the scans of another.
-        """
-        start = 0
-        for i, member in enumerate(self.members):
-            if i - start == width or member.trial.scans > longer * self.members[start].trial.scans:
-                yield self.members[start:i]
-                start = i
-        yield self.members[start:]
-
-
-def prepared(loops: Iterable[tuple[int, Loop]], plan: FleetPlan, shared: dict[Structure, Structure]) -> list[Prepared | Failed]:
-    """Return each loop as a program, or why it cannot be run.
+class Preparation:
+    """Prepares the loops of a run, and remembers how.
 
     Parameters
     ----------
-    loops : iterable of (int, Loop)
-        Loops with their places in the fleet.
     plan : FleetPlan
-        What is done to them.
-    shared : dict
-        Structures that there are already; new ones are added, so that like loops share theirs.
+        What is done to the loops.
+
+    Attributes
+    ----------
+    structures : dict
+        The structures that there are, so that like loops share theirs.
     """
-    with _no_collection():
-        return [_prepared(place, loop, plan, shared) for place, loop in loops]
+
+    def __init__(self, plan: FleetPlan) -> None:
+        self._plan = plan
+        self._kinds: dict[Hashable, KindOfComputation[RecordedLoop]] = {}
+        self.structures: dict[Structure, Structure] = {}
+
+    def prepared(self, loops: PlacedLoops) -> Iterator[Group | Failed]:
+        """Yield loops as programs, many of them at once, or why one cannot be run.
+
+        Parameters
+        ----------
+        loops : PlacedLoops
+            Some loops of the fleet.
+        """
+        left: list[int] = list(range(len(loops)))
+        if not self._plan.margins:  # these take each loop by itself
+            kinds, left = loops.loops.by_kind()
+            for kind, lot in kinds:
+                known = self._kinds.setdefault(kind, KindOfComputation())
+                done, others = known.compute(lot, self._record(loops))
+                left += others
+                yield from (self._group(loops, recorded, one) for recorded, one in done)
+        left.sort()
+        for start in range(0, len(left), _SLICE):
+            with no_collection():
+                found = [self._alone(loops, i) for i in left[start : start + _SLICE]]
+            yield from found
+
+    def _record(self, loops: PlacedLoops) -> Callable[[int, Sequence[float]], RecordedLoop]:
+        return lambda which, numbers: record(loops.loops[which], numbers, self._plan)
+
+    def _group(self, loops: PlacedLoops, recorded: RecordedLoop, lot: Lot) -> Group:
+        which, all_of_them = lot.which.tolist(), loops.loops
+        return Group(
+            self.structures.setdefault(recorded.structure, recorded.structure),
+            np.array([loops.places[i] for i in which]),
+            tuple(all_of_them.tags[i] for i in which),
+            tuple(all_of_them.cards[i] for i in which),
+            recorded.columns(lot.columns),
+            partial(_trial, self._plan, loops),
+        )
+
+    def _alone(self, loops: PlacedLoops, which: int) -> Group | Failed:
+        """Prepare one loop."""
+        place, loop = loops[which]
+        try:
+            trial = self._plan.trial(loop)
+            program = measured(trial)
+            margins = margins_if_any(trial) if self._plan.margins else None
+            stable = stability_of(trial, margins)
+            shared = self.structures.setdefault(program.structure, program.structure)
+        except Exception as error:  # whatever it is: one wrong loop among thousands stops no other
+            return Failed(place, reason_of(error))
+        numbers = (program.values, program.initial, program.lengths, trial.scan, trial.scans, last_answer(trial))
+        columns = PreparedColumns(*(np.array([x], dtype=np.float64) for x in numbers))
+        trial_at, card = partial(_trial, self._plan, loops), loop.settings.card.id
+        return Group(shared, np.array([place]), (loop.tag,), (card,), columns, trial_at, ((margins, stable),))
 
 
-def _prepared(place: int, loop: Loop, plan: FleetPlan, shared: dict[Structure, Structure]) -> Prepared | Failed:
-    try:
-        trial = plan.trial(loop)
-        program = measured(trial)
-        margins = margins_if_any(trial) if plan.margins else None
-        structure = program.structure
-        shared_one = shared.setdefault(structure, structure)
-    except Exception as error:  # whatever it is: one wrong loop among thousands stops no other
-        return Failed(place, reason_of(error))
-    return Prepared(place, loop.tag, trial, shared_one, program.values, program.initial, program.lengths, margins)
+def _trial(plan: FleetPlan, loops: PlacedLoops, place: int) -> Trial:
+    return plan.trial(loops.at(place))
 
 
 def reason_of(error: Exception) -> str:
@@ -147,7 +140,7 @@ def reason_of(error: Exception) -> str:
 
 
 @contextlib.contextmanager
-def _no_collection() -> Iterator[None]:
+def no_collection() -> Iterator[None]:
     """Make many objects without looking for circles among them after every few hundred: there are none."""
     was = gc.isenabled()
     gc.disable()
@@ -156,29 +149,3 @@ def _no_collection() -> Iterator[None]:
     finally:
         if was:
             gc.enable()
-
-
-def measured(trial: Trial) -> Program:
-    """Return a trial as a program that makes its own steps and figures; errors count from the load step on, or from the start."""
-    at, sizes = [], []
-    for step in (trial.setpoint_step, trial.load_step):
-        at.append(trial.scans if step is None else trial.first(step[0]))
-        sizes.append(0.0 if step is None else step[1])
-    start = 0 if trial.load_step is None else at[1]
-    measuring = Measuring(trial.scan, start, late_scan(trial.scans), trial.initial[2], trial.limits)
-    loop = trial.program(trial.controller())
-    return experiment(loop, Steps(trial.initial[0], sizes[0], at[0], sizes[1], at[1]), measuring)
-
-
-def grouped(members: Iterable[Prepared]) -> list[Group]:
-    """Return the loops by structure.
-
-    Parameters
-    ----------
-    members : iterable of Prepared
-        Loops that were prepared together, so that like ones share their structure.
-    """
-    found: dict[int, list[Prepared]] = {}
-    for member in members:
-        found.setdefault(id(member.structure), []).append(member)
-    return [Group(some[0].structure, tuple(sorted(some, key=lambda m: (m.trial.scans, m.lengths)))) for some in found.values()]

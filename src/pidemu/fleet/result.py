@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,10 +16,10 @@ from pidemu.files.tables import write_table
 from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.finished import Finished
 from pidemu.fleet.folder import Place
-from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgement
-from pidemu.fleet.loops import Loop
+from pidemu.fleet.judgement import MARGINS, RAN, Judgement, Status, judgements
+from pidemu.fleet.lists import LoopList
+from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.prepare import Failed
-from pidemu.simulation.trial import Trial
 
 HEADER: Final = ("tag", "card", "status", "scan", "scans", *COLUMNS, "settled", "stable", *MARGINS, "engine", "reason")
 """Columns of the table. Times are in seconds, signals in percent."""
@@ -47,12 +46,14 @@ class FleetResult:
 
     Parameters
     ----------
-    loops : sequence of Loop
+    loops : LoopList
         The fleet.
+    plan : FleetPlan
+        What is done to its loops.
 
     Attributes
     ----------
-    loops : tuple of Loop
+    loops : sequence of Loop
         The fleet.
     status : list of str
         ``"done"``; ``"unstable"``: it ran, and the loop is unstable; ``"ran away"``: it ran, and the measurement outgrew all
@@ -79,8 +80,8 @@ class FleetResult:
         How many loops an earlier run had done, whose results are here.
     """
 
-    def __init__(self, loops: Sequence[Loop]) -> None:
-        self.loops = tuple(loops)
+    def __init__(self, loops: LoopList, plan: FleetPlan) -> None:
+        self.loops, self._plan = loops, plan
         count = len(self.loops)
         self.status: list[Status] = ["not run"] * count
         self.reasons, self.engines = [""] * count, [""] * count
@@ -90,28 +91,27 @@ class FleetResult:
         self.scan, self.scans = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self.interrupted = False
         self.resumed = 0
-        self._places = {loop.tag: i for i, loop in enumerate(self.loops)}
-        self._signals: dict[int, tuple[Callable[[], Trial], Floats | Path, int]] = {}
+        self._places = {tag: i for i, tag in enumerate(loops.tags)}
+        self._signals: dict[int, tuple[Floats | Path, int]] = {}
 
     def add(self, found: BlockOutcome | Failed) -> int:
         """Take what came of a block, or of a loop that failed; return how many loops that is."""
         if isinstance(found, Failed):
             self.status[found.place], self.reasons[found.place] = "failed", found.reason
             return 1
-        places = [m.place for m in found.members]
+        places = found.members.places
         for name, column in found.columns.items():
             self.columns[name][places] = column
-        for i, member in enumerate(found.members):
-            place = member.place
-            self._take(place, judgement(found, i))
-            self.scan[place], self.scans[place] = member.trial.scan, member.trial.scans
-            self.engines[place] = found.engine.engine
-            kept = found.records if found.file is None else found.file
+        self.scan[places], self.scans[places] = found.members.columns.scan, found.members.scans
+        kept = found.records if found.file is None else found.file
+        for i, (member, judged) in enumerate(judgements(found)):
+            self._take(member.place, judged)
+            self.engines[member.place] = found.engine.engine
             if kept is not None:
-                self._signals[place] = (partial(_itself, member.trial), kept, i)
+                self._signals[member.place] = (kept, i)
         return len(places)
 
-    def resume(self, place: int, one: Finished, signals: Place | None, trial: Callable[[], Trial]) -> None:
+    def resume(self, place: int, one: Finished, signals: Place | None) -> None:
         """Take a loop that an earlier run had done.
 
         Parameters
@@ -122,15 +122,13 @@ class FleetResult:
             What came of it.
         signals : (Path, int) or None
             Where its signals are.
-        trial : callable
-            What was run, for whom wants the signals.
         """
         self._take(place, one.judged)
         for name, value in one.figures.items():
             self.columns[name][place] = value
         self.scan[place], self.scans[place], self.engines[place] = one.scan, one.scans, one.engine
         if signals is not None:
-            self._signals[place] = (trial, *signals)
+            self._signals[place] = signals
         self.resumed += 1
 
     def _take(self, place: int, judged: Judgement) -> None:
@@ -141,7 +139,7 @@ class FleetResult:
     @property
     def failures(self) -> dict[str, str]:
         """Why loops failed, by tag."""
-        return {loop.tag: why for loop, why, is_ in zip(self.loops, self.reasons, self.status, strict=True) if is_ == "failed"}
+        return {tag: why for tag, why, is_ in zip(self.loops.tags, self.reasons, self.status, strict=True) if is_ == "failed"}
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -169,21 +167,21 @@ class FleetResult:
                 if done
                 else f"loop '{tag}' has no signals: {self.reasons[place] or self.status[place]}"
             )
-        made, kept, lane = self._signals[place]
-        trial = made()
+        kept, lane = self._signals[place]
+        trial = self._plan.trial(self.loops[place])
         records = np.load(kept, mmap_mode="r") if isinstance(kept, Path) else kept
         out, pv = np.array(records[:, : trial.scans, lane])
         return LoopSignals(trial.times, trial.setpoint, pv, out)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row per loop, with the names of `HEADER`; what is not known is ``None``."""
-        for i, loop in enumerate(self.loops):
+        for i, (tag, card) in enumerate(zip(self.loops.tags, self.loops.cards, strict=True)):
             ran = self.status[i] in RAN
             figures = {name: float(self.columns[name][i]) if ran else None for name in COLUMNS}
             margins = {name: None if np.isnan(x := self.columns[name][i]) else float(x) for name in MARGINS}
             yield {
-                "tag": loop.tag,
-                "card": loop.settings.card.id,
+                "tag": tag,
+                "card": card,
                 "status": self.status[i],
                 "scan": float(self.scan[i]) if ran else None,
                 "scans": int(self.scans[i]) if ran else None,
@@ -209,7 +207,3 @@ class FleetResult:
             The file cannot be written.
         """
         write_table(path, HEADER, self.rows(), FleetError)
-
-
-def _itself(trial: Trial) -> Trial:
-    return trial

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pidemu.card.library import folders, load_card_by_id, loaded_files
-from pidemu.errors import CardError, FleetError, PidemuError, SettingError, suggest
+from pidemu.card.library import folders, loaded_files
+from pidemu.errors import CardError, FleetError, PidemuError, suggest
 from pidemu.excerpt import quoted, visible
 from pidemu.files.reading import Kind, control, read_text
-from pidemu.files.tables import Lines, counted, shown_delimiter, split_lines, split_row, write_table
+from pidemu.files.tables import Lines, split_lines, write_table
+from pidemu.fleet.lists import LoopList
 from pidemu.fleet.loops import Loop
-from pidemu.fleet.prepare import reason_of
+from pidemu.fleet.patterns import Patterns
+from pidemu.fleet.prepare import no_collection, reason_of
 from pidemu.fleet.result import HEADER, FleetResult
-from pidemu.parsing import assignments, pair, seconds, step
-from pidemu.process.process import parse_process
-from pidemu.settings.action import Action
+from pidemu.fleet.rows import COLUMNS, REQUIRED, Row, RowReader, cells, check_row
+from pidemu.fleet.tabled import TableLoops
 
-COLUMNS: Final = ("tag", "card", "settings", "process", "scan", "action", "limits", "setpoint", "load", "time")
-"""Columns of a file of loops."""
-_REQUIRED: Final = COLUMNS[:4]
 _KIND: Final = Kind("a table of loops", "save it as CSV text in UTF-8, with a header line such as tag,card,settings,process")
-_ACTIONS: Final[Mapping[str, Action]] = {"reverse": "reverse", "direct": "direct"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class LoopTable:
     ----------
     path : str
         The file.
-    loops : tuple of Loop
+    loops : sequence of Loop
         The loops, in the order of the file.
     lines : tuple of int
         The line of each loop in the file, counted from 1.
@@ -66,7 +62,7 @@ class LoopTable:
     """
 
     path: str
-    loops: tuple[Loop, ...]
+    loops: LoopList
     lines: tuple[int, ...]
     wrong: tuple[WrongRow, ...]
     skipped: str = ""
@@ -146,106 +142,89 @@ def read_loops(path: str | Path, vendors: Sequence[str | Path] = ()) -> LoopTabl
     try:
         if lines.contradiction:
             raise FleetError(lines.contradiction)
-        header = _header(_cells(names, delimiter))
+        header = _header(cells(names, delimiter))
     except FleetError as error:
         raise FleetError(f"{visible(str(path))}:{head}: {error}") from None
-    loops: list[Loop] = []
-    numbers: list[int] = []
-    wrong: list[WrongRow] = []
-    seen: dict[str, int] = {}
-    for number, line in rows:
-        row: Mapping[str, str] = {}
+    reader = RowReader(tuple(header), delimiter, tuple(vendors))
+    with no_collection():
+        return LoopTable(str(path), *_Reading(reader, rows).result(), lines.skipped)
+
+
+class _Reading:
+    """Reads the rows of a table: those that are alike together, the others one by one."""
+
+    def __init__(self, reader: RowReader, lines: Sequence[tuple[int, str]]) -> None:
+        self._reader, self._lines = reader, lines
+        self._wrong: list[WrongRow] = []
+        self._tags = [""] * len(lines)
+        self._alone: list[int] = []
+        seen: dict[str, int] = {}
+        self._patterns = Patterns(reader, seen)
+        for which, (number, line) in enumerate(lines):
+            tag = self._patterns.take(which, number, line)
+            if tag is None:
+                self._look_at(which, seen)
+            else:
+                self._tags[which] = tag
+
+    def _look_at(self, which: int, seen: dict[str, int]) -> None:
+        """Look at a row that is to be read alone."""
+        row: Row = {}
         try:
-            cells = _cells(line, delimiter)
-            row = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if cell.strip()}
-            _refuse_hidden(header, cells)
-            if len(cells) != len(header):
-                remedy = f"put a cell that holds {shown_delimiter(delimiter)} in quotation marks"
-                remedy = "comments stand above the header" if cells[0].startswith("#") and len(cells) == 1 else remedy
-                raise FleetError(f"{counted(len(cells), 'cell')}, the header has {len(header)}; {remedy}")
-            loops.append(_loop(row, number, seen, vendors))
-            numbers.append(number)
-        except Exception as error:  # whatever it is: one wrong row among thousands stops no other
-            reason = _in_one_line(error) if isinstance(error, PidemuError) else reason_of(error)
-            tag, card = (visible(row.get(name, "")) for name in ("tag", "card"))
-            wrong.append(WrongRow(number, tag, card, reason))
-    return LoopTable(str(path), tuple(loops), tuple(numbers), tuple(wrong), lines.skipped)
+            check_row(self._reader.row(self._lines[which][1], row), self._lines[which][0], seen)
+        except Exception as error:
+            self._fail(which, row, error)
+        else:
+            self._tags[which] = row["tag"]
+            self._alone.append(which)
+
+    def _fail(self, which: int, row: Row, error: Exception) -> None:
+        reason = _in_one_line(error) if isinstance(error, PidemuError) else reason_of(error)
+        tag, card = (visible(row.get(name, "")) for name in ("tag", "card"))
+        self._wrong.append(WrongRow(self._lines[which][0], tag, card, reason))
+
+    def result(self) -> tuple[TableLoops, tuple[int, ...], tuple[WrongRow, ...]]:
+        """Return the loops, their lines, and the rows that make none."""
+        alike, others = self._patterns.read()
+        alone: dict[int, Loop] = {}
+        for which in sorted([*self._alone, *others]):
+            row: Row = {}
+            try:
+                alone[which] = self._reader.loop(self._reader.row(self._lines[which][1], row))
+            except Exception as error:  # whatever it is: one wrong row among thousands stops no other
+                self._fail(which, row, error)
+        loops = TableLoops(self._reader, self._lines, self._tags, alike, alone)
+        self._wrong.sort(key=lambda wrong: wrong.line)
+        return loops, tuple(self._lines[i][0] for i in loops.rows), tuple(self._wrong)
 
 
 def _lines(path: str | Path) -> Lines:
     """Return the lines of a file; a control character, or a byte that is not UTF-8, costs its row only."""
     lines = split_lines(read_text(path, FleetError, _KIND, by_line=True), skip_empty_rows=True)
     if len(lines.rows) < 2:
-        wanted = f"the file has a header line such as {','.join(_REQUIRED)} and one line per loop"
+        wanted = f"the file has a header line such as {','.join(REQUIRED)} and one line per loop"
         raise FleetError(f"{visible(str(path))}: no loops; {wanted}")
     return lines
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line; what is not seen is still at their ends."""
-    try:
-        return split_row(line, delimiter)
-    except ValueError as error:
-        raise FleetError(control(line) or str(error)) from None
-
-
-def _refuse_hidden(header: Sequence[str], cells: Sequence[str]) -> None:
-    """Refuse a control character, or a byte that is not UTF-8, in a cell; the column is the one that the header names."""
-    for name, cell in itertools.zip_longest(header, cells, fillvalue=""):
-        fault = control(cell)
-        if fault is not None:
-            raise FleetError(f"column {name}: {fault}" if name else fault)
-
-
-def _header(cells: Sequence[str]) -> list[str]:
+def _header(found: Sequence[str]) -> list[str]:
     """Return the names of the columns."""
-    for at, cell in enumerate(cells, 1):
+    for at, cell in enumerate(found, 1):
         if fault := control(cell):
             raise FleetError(f"column {at}: {fault}")
-    cells = [cell.strip() for cell in cells]
-    names = [cell.casefold() for cell in cells]
-    unknown = [cell for cell, name in zip(cells, names, strict=True) if name not in COLUMNS]
+    stripped = [cell.strip() for cell in found]
+    names = [cell.casefold() for cell in stripped]
+    unknown = [cell for cell, name in zip(stripped, names, strict=True) if name not in COLUMNS]
     if unknown:
         which = quoted(", ".join(f"'{quoted(cell)}'{suggest(cell, COLUMNS)}" for cell in unknown), 400)
         raise FleetError(f"unknown column{'s' if len(unknown) > 1 else ''} {which}; columns: {', '.join(COLUMNS)}")
-    missing = [name for name in _REQUIRED if name not in names]
+    missing = [name for name in REQUIRED if name not in names]
     if missing:
-        raise FleetError(f"no column '{missing[0]}'; {', '.join(_REQUIRED)} are needed")
+        raise FleetError(f"no column '{missing[0]}'; {', '.join(REQUIRED)} are needed")
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise FleetError(f"the column '{twice[0]}' comes twice; keep one")
     return names
-
-
-def _loop(row: Mapping[str, str], line: int, seen: dict[str, int], vendors: Sequence[str | Path]) -> Loop:
-    """Return the loop of a row; `seen` has the line of every tag."""
-    for name in ("tag", "card", "process"):
-        if name not in row:
-            raise FleetError(f"no {name}; every loop needs one")
-    first = seen.setdefault(row["tag"], line)
-    if first != line:
-        raise FleetError(f"line {first} has this tag already; give each loop its own")
-    words = (word for word in row.get("settings", "").split(";") if word.strip())
-    given = assignments(words, such="GAIN=2; RESET=20 s/repeat", between="semicolons, such as GAIN=2; RESET=20")
-    readers = {"scan": seconds, "time": seconds, "setpoint": step, "load": step, "limits": pair, "action": _action}
-    found: dict[str, Any] = {}
-    for name, read in readers.items():
-        if name in row:
-            try:
-                found["output_limits" if name == "limits" else name] = read(row[name])
-            except SettingError as error:
-                raise SettingError(f"{name}: {error}") from None
-    settings = load_card_by_id(row["card"], vendors).settings(given)
-    return Loop(row["tag"], settings, parse_process(row["process"]), **found)
-
-
-def _action(text: str) -> Action:
-    action = _ACTIONS.get(text.casefold())
-    if action is None:
-        raise SettingError(
-            f"'{quoted(text)}' is neither reverse nor direct{suggest(text, _ACTIONS)}; leave the cell empty for negative feedback"
-        )
-    return action
 
 
 def _in_one_line(error: PidemuError) -> str:

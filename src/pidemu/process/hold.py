@@ -20,7 +20,6 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial
 
 from pidemu.arrays import Floats
 from pidemu.errors import ProcessError
@@ -119,7 +118,7 @@ def responses(gain: float, poles: Sequence[complex], zeros: Sequence[complex], h
     return np.asarray(gain * found * np.exp(-1j * w * h * scans), dtype=np.complex128)
 
 
-def _whole_scans(delays: Floats, h: float) -> tuple[Floats, Floats]:
+def _whole_scans(delays: Floats, h: float | Floats) -> tuple[Floats, Floats]:
     """Return the whole scans in dead times [s], and what is left of each."""
     scans = np.floor(delays / h + _WHOLE)
     fraction = delays - scans * h
@@ -175,16 +174,29 @@ def sample(gain: float, poles: Sequence[complex], zeros: Sequence[complex], dela
     """Return the sampled model; see `pidemu.Process.sampled`."""
     if not (math.isfinite(h) and h > 0):
         raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
-    A, B = chain(poles)
     row, through = outputs(poles, zeros)
-    whole_scans, fractions = _whole_scans(np.array([delay]), h)
-    scans, fraction = int(whole_scans[0]), float(fractions[0])
-    with np.errstate(over="ignore", invalid="ignore"):
-        (whole, after, _), (_, late, begun) = expm1(A, B, (h, h - fraction, fraction))
-        early = begun + after @ begun
-    if not all(np.isfinite(x).all() for x in (whole, late, early)):
+    (growth,), (early,), (late,), (scans,) = held(*chain(poles), np.array([delay]), np.array([h]))
+    if not all(np.isfinite(x).all() for x in (growth, late, early)):
         raise ProcessError(f"the process outgrows all numbers within one scan of {h:g} s; give a shorter scan interval")
-    return SampledProcess(h, whole, early, late, gain * row, gain * through, scans)
+    return SampledProcess(h, growth, early, late, gain * row, gain * through, int(scans))
+
+
+def held(A: Floats, B: Floats, delays: Floats, h: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return F, E, G and d of processes behind a hold.
+
+    Parameters
+    ----------
+    A, B : ndarray, shape (..., n, n) and (..., n)
+        States, as `chain` returns them; of each process, or of all.
+    delays, h : ndarray, shape (processes,)
+        Dead times and scan intervals [s].
+    """
+    scans, fractions = _whole_scans(delays, h)
+    with np.errstate(over="ignore", invalid="ignore"):
+        grown, moved = expm1(A, B, np.stack([h, h - fractions, fractions], axis=-1))
+        begun = moved[:, 2]
+        early = begun + (grown[:, 1] @ begun[..., None])[..., 0]
+    return grown[:, 0], early, moved[:, 1], scans
 
 
 def _in_order(poles: Sequence[complex]) -> list[complex]:
@@ -214,31 +226,58 @@ def chain(poles: Sequence[complex]) -> tuple[Floats, Floats]:
 
 def outputs(poles: Sequence[complex], zeros: Sequence[complex]) -> tuple[Floats, float]:
     """Return what of the states makes the numerator, and what is left at once: division by one section after the other."""
-    rest = np.array(polynomial_of(zeros))
+    rest = list(polynomial_of(zeros))
     row: list[float] = []
     for p in reversed(_in_order(poles)):
-        rest, left = polynomial.polydiv(rest, polynomial_of([p]))
+        rest, left = _divided(rest, polynomial_of([p]))
         constant, slope = (*left, 0.0)[:2]
         row = [constant + slope * p.real, slope * abs(p), *row] if p.imag else [constant, *row]
-    return np.array(row, dtype=np.float64), float(rest[0])
+    return np.array(row, dtype=np.float64), rest[0]
+
+
+def _divided(polynomial: Sequence[float], by: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return quotient and remainder of polynomials, coefficients ascending, in plain numbers: arrays of two or three are slower."""
+    left, degree = list(polynomial), len(by) - 1
+    while len(left) > 1 and not left[-1]:
+        left.pop()
+    lower = [x / by[-1] for x in by[:-1]]
+    for last in range(len(left) - 1, degree - 1, -1):
+        for i, x in enumerate(lower, last - degree):
+            left[i] -= x * left[last]
+    return [x / by[-1] for x in left[degree:]] or [left[0] * 0.0], left[:degree]
 
 
 def expm1(A: Floats, B: Floats, times: Sequence[float] | Floats) -> tuple[Floats, Floats]:
     """Return ``exp(A t) - I`` and ``integral_0^t exp(A x) dx B`` for several times, by series and doubling.
 
     ``F(2t) = 2 F(t) + F(t)^2``: nothing cancels in that, as it would in the squaring of ``exp(A t)``.
+
+    Parameters
+    ----------
+    A, B : ndarray, shape (..., n, n) and (..., n)
+        The system, or one after the other.
+    times : array_like, shape (..., m)
+        Times [s]; those of one system are computed with the same number of doublings.
     """
-    n = B.size
-    X = np.zeros((len(times), n + 1, n + 1))
+    n = B.shape[-1]
     t = np.array(times)
-    X[:, :n, :n], X[:, :n, n] = A * t[:, None, None], B * t[:, None]
-    size = float(np.abs(X).sum(axis=2).max())
-    doublings = max(0, math.ceil(math.log2(2 * size))) if size else 0
-    X /= 2.0**doublings
-    F = term = X
+    X = np.zeros((*t.shape, n + 1, n + 1))
+    X[..., :n, :n], X[..., :n, n] = A[..., None, :, :] * t[..., None, None], B[..., None, :] * t[..., None]
+    sizes = np.abs(X).sum(axis=-1).max(axis=(-2, -1))
+    doublings = np.array([_doublings(size) for size in sizes.ravel().tolist()], dtype=np.int64).reshape(sizes.shape)
+    X /= np.ldexp(1.0, doublings)[..., None, None, None]
+    F, term = X.copy(), X
     for k in range(2, _TERMS):
-        term = term @ X / k
-        F = F + term
-    for _ in range(doublings):
-        F = 2 * F + F @ F
-    return F[:, :n, :n], F[:, :n, n]
+        term = term @ X
+        term /= k
+        F += term
+    for done in range(doublings.max(initial=0)):
+        left = doublings > done
+        some = F if left.all() else F[left]
+        F[left] = 2 * some + some @ some
+    return F[..., :n, :n], F[..., :n, n]
+
+
+def _doublings(size: float) -> int:
+    """Return how often a step of the series is doubled, from the norm of the whole."""
+    return max(0, math.ceil(math.log2(2 * size))) if 0 < size < math.inf else 0

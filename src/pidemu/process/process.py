@@ -16,10 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pidemu.arrays import Floats
+from pidemu.columns.functions import is_traced, sign_of
 from pidemu.errors import ProcessError
 from pidemu.law.rational import Rational, Response
 from pidemu.plausible import GAIN, POLES, PROCESS_TIME, plausible
 from pidemu.process.hold import SampledProcess, sample
+from pidemu.process.hold_columns import sampled_traced
 from pidemu.process.roots import count, factors, in_pairs, joined, poles_of, polynomial_of, zeros_of
 from pidemu.process.text import PERCENT, gain_unit, read
 from pidemu.settings.ranges import PERCENT as RANGE
@@ -147,6 +149,22 @@ class Process:
         pv, op = (given.span for given in ranges)
         return replace(self, gain=self.gain * op / pv, unit=PERCENT)
 
+    def with_numbers(self, gain: Any, delay: Any, roots: Sequence[Any]) -> Process:
+        """Return a process of this shape with other numbers, which are not checked: they are those of one that was.
+
+        Parameters
+        ----------
+        gain, delay : number
+            Gain and dead time.
+        roots : sequence of number
+            Poles, then zeros, as many as there are.
+        """
+        made, n = object.__new__(Process), len(self.poles)
+        numbers = {"gain": gain, "poles": tuple(roots[:n]), "zeros": tuple(roots[n:]), "delay": delay, "unit": self.unit}
+        for name, value in numbers.items():
+            object.__setattr__(made, name, value)
+        return made
+
     def rounded(self, digits: int = 6) -> Process:
         """Return the process with so many significant digits of gain, lags and leads, and dead time, as they are printed."""
 
@@ -205,7 +223,8 @@ class Process:
         ProcessError
             The interval is not a positive number, or an unstable process outgrows all numbers within it.
         """
-        return sample(self.gain, self.poles, self.zeros, self.delay, h)
+        sampled = sampled_traced if is_traced(self.gain, self.delay, h, *self.poles, *self.zeros) else sample
+        return sampled(self.gain, self.poles, self.zeros, self.delay, h)
 
     @cached_property
     def rational(self) -> Rational:
@@ -231,7 +250,7 @@ class Process:
         needs a positive controller gain.
         """
         turned = sum(p.imag == 0 and p.real > 0 for p in self.poles)
-        return math.copysign(1.0, self.gain) * (-1.0) ** turned
+        return sign_of(self.gain) * (-1.0) ** turned
 
     @property
     def time(self) -> float:

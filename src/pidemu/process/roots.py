@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
+from pidemu.columns.functions import isfinite
+from pidemu.columns.traced import Traced
 from pidemu.errors import ProcessError
 from pidemu.law.rational import multiply
 from pidemu.plausible import INTEGRATORS, PROCESS_TIME, ROOT, plausible, shown
@@ -17,11 +18,11 @@ _SAME: Final = 1e-9
 def in_pairs(name: str, given: Any) -> tuple[complex, ...]:
     """Return roots: the real ones as they stand, then each complex one followed by its exact conjugate."""
     try:
-        roots = [complex(r) for r in given]
+        roots: list[Any] = [r if isinstance(r, Traced) else complex(r) for r in given]
     except (TypeError, ValueError, OverflowError):
         raise ProcessError(f"{name}s is {shown(given)}; give a list of numbers [rad/s] such as [-0.1, -0.5]") from None
     for r in roots:
-        if not (math.isfinite(r.real) and math.isfinite(r.imag)):
+        if not (isfinite(r.real) and isfinite(r.imag)):
             raise ProcessError(f"the {name} {r} is not finite; give its place in the s plane [rad/s]")
         if not ROOT.has(abs(r)):
             raise ProcessError(f"the {name} {r:g}: {ROOT.refusal(f'{abs(r):g} rad/s')}")

@@ -6,7 +6,6 @@ A block gets the `Builder` and the expressions it works on, adds its coefficient
 from __future__ import annotations
 
 import functools
-import math
 import operator
 from collections.abc import Sequence
 from typing import Final
@@ -14,6 +13,7 @@ from typing import Final
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
 from pidemu.card.model.signals import ErrorShape, SignalFilter
+from pidemu.columns.functions import exp, expm1
 from pidemu.program.ir import Assign, Binary, Expr, Floor, Name, Operand, Program, Quantity, equal, expr, names_in, select
 
 TINY: Final = 1e-300
@@ -331,14 +331,14 @@ def _decay(rule: Rule, gain: float, Tf: float, h: float) -> tuple[float, float]:
         case Rule.TRAPEZOIDAL:
             return (2 * Tf - h) / (2 * Tf + h), 2 * gain / (2 * Tf + h)
         case Rule.EXACT:
-            return math.exp(-h / Tf), gain * -math.expm1(-h / Tf) / h
+            return exp(-h / Tf), gain * -expm1(-h / Tf) / h
     raise ValueError(f"the {rule.value} rule has a block of its own")
 
 
 def _lagged_difference(b: Builder, x: Expr, xf: Name, gain: float, Tf: float, h: float) -> None:
     """The difference of the signal and its own exact lag, ``D = (kd/Tf)(x - xf)`` (section 4)."""
-    keep = b.coefficient("D_decay", math.exp(-h / Tf), "share of the lagged signal that is kept", "-")
-    take = b.coefficient("D_take", 1 - math.exp(-h / Tf), "share of the new signal", "-")
+    keep = b.coefficient("D_decay", exp(-h / Tf), "share of the lagged signal that is kept", "-")
+    take = b.coefficient("D_take", 1 - exp(-h / Tf), "share of the new signal", "-")
     k = b.coefficient("D_gain", gain / Tf, "kd/Tf", "1/s")
     b.let(xf.id, keep * xf + take * x, "signal of the derivative, lagged")
     b.let("D", k * (x - xf), f"derivative, Tf = {Tf:.6g} s, lagged difference (section 4)")

@@ -13,6 +13,7 @@ import numpy as np
 
 from pidemu.algorithm.model import Algorithm, check_filters
 from pidemu.card.model.base import Rule
+from pidemu.columns.functions import each, isfinite
 from pidemu.errors import ScanError
 from pidemu.program.blocks import EXTRA_INPUTS, TINY, TINY_SINGLE, Builder
 from pidemu.program.dahlin import dahlin
@@ -84,19 +85,20 @@ def _representable(limits: tuple[float, float], a: Algorithm) -> tuple[float, fl
     """Return the limits as the program's numbers can hold them, never outside those given."""
     if a.arithmetic.type != "float32":
         return limits
-    low, high = (np.float32(x) for x in limits)
-    if float(low) < limits[0]:
-        low = np.nextafter(low, np.float32(math.inf))
-    if float(high) > limits[1]:
-        high = np.nextafter(high, np.float32(-math.inf))
-    return float(low), float(high)
+    return each(_not_below, limits[0]), -each(_not_below, -limits[1])
+
+
+def _not_below(x: float) -> float:
+    """Return the smallest float32 number that is not below."""
+    found = np.float32(x)
+    return float(np.nextafter(found, np.float32(math.inf)) if float(found) < x else found)
 
 
 def _check(a: Algorithm, h: float, limits: tuple[float, float], bias: float, initial_output: float, signals: Sequence[str]) -> None:
-    if not (math.isfinite(h) and (h > 0 or (h == 0 and a.derivative.rule is Rule.LAGGED_DIFFERENCE))):
+    if not (isfinite(h) and (h > 0 or (h == 0 and a.derivative.rule is Rule.LAGGED_DIFFERENCE))):
         raise ScanError(f"scan interval {h:g} s is not a positive number")
     for name, value in (("bias", bias), ("initial output", initial_output)):
-        if not math.isfinite(value):
+        if not isfinite(value):
             raise ScanError(f"the {name} {value:g} is not a finite number")
     low, high = limits
     if not low < high:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import partial
 from typing import Final
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.card.model.base import Rule
+from pidemu.columns.functions import each, plain
 from pidemu.errors import ScanError
 from pidemu.program import blocks, output
 from pidemu.program.blocks import Builder
@@ -65,6 +67,12 @@ def integer(b: Builder, a: Algorithm, h: float, t: Terms) -> None:
 
 
 def _ticks(seconds: float, what: str) -> int:
+    """Return a time in steps of the arithmetic."""
+    found: int = each(partial(_whole_ticks, what), seconds)
+    return found
+
+
+def _whole_ticks(what: str, seconds: float) -> int:
     ticks = Fraction(seconds).limit_denominator(10**7) * _TICKS
     if abs(ticks - round(ticks)) > Fraction(1, 1000) or (seconds and not round(ticks)):
         raise ScanError(f"the {what} of {seconds:g} s is not a whole number of {1 / _TICKS:g} s, the step of integer arithmetic")
@@ -76,7 +84,8 @@ def _whole(value: float, what: str) -> float:
         raise ScanError(f"the {what} is not a whole number of counts, {value:g}; give it in the steps of the card's dial")
     if abs(value) >= _LARGEST:
         raise ScanError(f"the {what} is too large for whole numbers")
-    return float(round(value))
+    found: float = plain(round(value))
+    return found
 
 
 def _whole_counts(x: Expr, counts: Name) -> Expr:
@@ -100,8 +109,8 @@ def _divided(b: Builder, name: str, total: Expr, by: Name, remainder: Name, text
 
 def _integral(b: Builder, e: Expr, h: int, Ti: int) -> Expr:
     step, time = (
-        b.coefficient("h_ticks", float(h), "scan interval", "ticks"),
-        b.coefficient("Ti_ticks", float(Ti), "integral time", "ticks"),
+        b.coefficient("h_ticks", plain(h), "scan interval", "ticks"),
+        b.coefficient("Ti_ticks", plain(Ti), "integral time", "ticks"),
     )
     rest = b.state("Ir", "remainder of the integral", "-")
     return _divided(b, "dI", e * step + rest, time, rest, "increment of the integral")
@@ -109,10 +118,10 @@ def _integral(b: Builder, e: Expr, h: int, Ti: int) -> Expr:
 
 def _derivative(b: Builder, y: Expr, h: int, Td: int, Tf: int, t: Terms) -> Expr:
     step, time = (
-        b.coefficient("h_ticks", float(h), "scan interval", "ticks"),
-        b.coefficient("Td_ticks", float(Td), "derivative time", "ticks"),
+        b.coefficient("h_ticks", plain(h), "scan interval", "ticks"),
+        b.coefficient("Td_ticks", plain(Td), "derivative time", "ticks"),
     )
-    under = b.coefficient("under", float(h + Tf), "scan interval and filter time", "ticks")
+    under = b.coefficient("under", plain(h + Tf), "scan interval and filter time", "ticks")
     y1, D, rest = (
         b.state("y1", "measurement in counts at the last scan", "-"),
         b.state("D", "derivative term in counts", "-"),

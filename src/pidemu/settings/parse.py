@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Final
 
 from pidemu.card.load import Card, Variant, match_name
 from pidemu.card.model.base import Form
 from pidemu.card.model.card_file import Equation, Setting, default_scan
+from pidemu.columns.functions import isinf, isnan
 from pidemu.errors import SettingError, UnitError, suggest
 from pidemu.plausible import GAIN, LEVEL, RATE, RATIO, TIME, WEIGHT, PlausibleSize, number, shown
 from pidemu.settings.ranges import RANGES, SignalRange, are_limits, read_range
@@ -227,7 +227,7 @@ def _check(value: Value, written: object) -> None:
     setting, unit = value.setting, value.unit
     unit = "" if unit == "1" else f" {unit}"
     words = f"{value.value:.6g}{unit}" + (f" (given as {written})" if written is not None else "")
-    if math.isnan(value.value):
+    if isnan(value.value):
         raise SettingError("is not a number (NaN)")
     if value.off:
         return
@@ -236,7 +236,7 @@ def _check(value: Value, written: object) -> None:
         allowed = f"{low:g} to {high:g}{unit}"
         off = off_values(setting)
         raise SettingError(f"{words} is outside {allowed}" + (f"; {off[0]:g} switches it off" if off else ""))
-    if math.isinf(value.value):
+    if isinf(value.value):
         off = off_values(setting)
         does = f"; {off[0]:g} does" if off else ""
         raise SettingError(f"{words} is infinite, and infinity does not switch it off here{does}")
@@ -250,7 +250,7 @@ def _check(value: Value, written: object) -> None:
 def _check_size(value: Value, words: str) -> None:
     """Refuse a dial whose canonical value no controller has; what computes with it could not hold it."""
     canonical, quantity = value.canonical, _QUANTITIES.get(value.role, WEIGHT)
-    if value.off or not value.value or math.isinf(value.value):
+    if value.off or not value.value or isinf(value.value):
         return
     if not canonical or not quantity.has(canonical):
         same = f"{canonical:.6g} {quantity.unit}".rstrip()

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
 
+from pidemu.columns.functions import plain
 from pidemu.errors import SettingError
 from pidemu.excerpt import quoted
 from pidemu.formatting import exactly
@@ -97,12 +98,12 @@ class SignalRange:
 
     def limits_from_percent(self, limits: Limits) -> Limits:
         """Return limits in percent as levels [`unit`]; what is no limit stays as it is."""
-        low, high = (self.from_percent(x) if is_limit(x) else x for x in map(float, limits))
+        low, high = (self.from_percent(x) if is_limit(x) else x for x in map(plain, limits))
         return low, high
 
     def limits_in_percent(self, limits: Limits) -> Limits:
         """Return limits [`unit`] in percent; what is no limit stays as it is."""
-        low, high = (self.in_percent(x) if is_limit(x) else x for x in map(float, limits))
+        low, high = (self.in_percent(x) if is_limit(x) else x for x in map(plain, limits))
         return low, high
 
     @property

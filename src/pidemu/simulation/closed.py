@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+import numpy as np
+
 from pidemu.process.hold import SampledProcess
 from pidemu.program import blocks
 from pidemu.program.ir import Assign, Expr, Line, Name, Operand, Program, Quantity, expr
@@ -125,7 +127,7 @@ def _measured(p: Parts, process: SampledProcess, x: list[Name], y: str, rest: fl
 def _moved(p: Parts, process: SampledProcess, x: list[Name], was: Name, late: Name) -> None:
     """Go on by a scan; states are assigned in place, the last first, where none depends on a later one."""
     n = len(x)
-    rows = [[*process.growth[i].tolist(), float(process.early[i]), float(process.late[i])] for i in range(n)]
+    rows = np.column_stack([process.growth, process.early, process.late]).tolist()
     in_place = all(rows[i][j] == 0 for i in range(n) for j in range(i + 1, n))
     now = [*x, was, late]
     for i in reversed(range(n)):

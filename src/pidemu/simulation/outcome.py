@@ -54,10 +54,26 @@ def settled_by(trial: Trial, figures: Mapping[str, float]) -> bool | None:
     figures : mapping of str to float
         Its figures, ``swing`` and ``peak`` among them [%].
     """
+    return settled((trial.scans - 1) * trial.scan, last_answer(trial), figures["swing"], figures["peak"])
+
+
+def last_answer(trial: Trial) -> float:
+    """Return when the process begins to answer the last step of a trial [s]; minus infinity where there is none."""
     steps = [step[0] for step in (trial.setpoint_step, trial.load_step) if step is not None]
-    if steps and (trial.scans - 1) * trial.scan <= max(steps) + trial.process.delay:
-        return None
-    return has_settled(figures["swing"], figures["peak"])
+    return max(steps) + trial.process.delay if steps else -math.inf
+
+
+def settled(end: float, answer: float, swing: float, peak: float) -> bool | None:
+    """Return whether a run had settled at its end; ``None`` where it ends before the process has answered.
+
+    Parameters
+    ----------
+    end, answer : float
+        The last scan, and what `last_answer` returns [s].
+    swing, peak : float
+        As in `has_settled` [%].
+    """
+    return None if end <= answer else has_settled(swing, peak)
 
 
 def feedback_is_negative(trial: Trial) -> bool:

@@ -1,0 +1,1 @@
+"""Processes: models, fits, relay experiments."""
