@@ -198,7 +198,7 @@ def fresh(program: Program) -> list[Any]:
 def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(engine: Engine) -> None:
     program = loop_program()
     function, most = block(program.structure, engine)
-    width, scans = (most if engine == "numba" else 6), 90
+    width, scans = (most if engine in ("numba", "c") else 6), 90
     lengths = np.array([[1 + 5 * i % 17 for i in range(width)]], dtype=np.int64)
     values = np.array([[x * (1 + 0.001 * i) for i in range(width)] for x in program.values])
     sp, load = (base + 5 * np.sin(np.arange(scans)[:, None] / (5 + np.arange(width))) for base in (50, 0))

@@ -236,7 +236,7 @@ def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
     structure : Structure
         What the loops have in common.
     engine : {"python", "numpy", "numba", "c"}
-        The engine. Plain Python and C run one loop after the other.
+        The engine. Plain Python runs one loop after the other.
     """
     if engine == "numba":
         from pidemu.backends import numba
@@ -246,6 +246,10 @@ def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
         from pidemu.backends import numpy
 
         return numpy.block(structure), numpy.WIDTH
+    if engine == "c":
+        from pidemu.backends import native
+
+        return native.block(structure), native.WIDTH
     return one_by_one(structure, engine), 64
 
 

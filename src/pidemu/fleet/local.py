@@ -20,8 +20,10 @@ from pidemu.program.ir import Structure
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
 """Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""
-_SIDE_BY_SIDE: Final = ("numpy", "numba")
+_SIDE_BY_SIDE: Final = ("numpy", "numba", "c")
 """Engines that take about as long for a block as for its longest loop; the others run one loop after the other."""
+_FIXED: Final = ("numba", "c")
+"""Engines whose blocks have one width: it is a constant of what they compile."""
 _TURN: Final = threading.Lock()
 _AT_ONCE: Final = 8192
 """Loops that are prepared, and then run, at a time: what is in memory does not grow with the fleet."""
@@ -29,7 +31,7 @@ _AT_ONCE_KEPT: Final = 2048
 """The same where signals are kept: preparing them takes 2 to 10 s, and until it is over nothing is complete."""
 _WORK: Final = 2**22
 """Loops times scans of a block whose signals are kept: some 3 s in plain Python. A run that is killed loses them."""
-_NARROWEST: Final = {"numpy": 1024, "numba": 64}
+_NARROWEST: Final = {"numpy": 1024, "numba": 64, "c": 64}
 """Loops below which a block is not made narrower: half as wide, these engines take longer for the same (1.6 and 2 times)."""
 _SLICE: Final = 128
 """Loops that are prepared from one look at what is done to the next."""
@@ -100,7 +102,7 @@ class _Threads:
             function = _in_turn(function)
         widest = width if self._room is None else min(width, max(_NARROWEST.get(choice.engine, 1), _WORK // group.scans))
         for part in group.parts(widest, 2 if choice.engine in _SIDE_BY_SIDE else 1):
-            lanes = width if choice.engine == "numba" else len(part)
+            lanes = width if choice.engine in _FIXED else len(part)
             self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
             self._left += 1
 
