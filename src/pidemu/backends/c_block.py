@@ -12,6 +12,11 @@ from pidemu.program.ir import Program
 WIDTH: Final = 64
 """Loops in a block: a constant of the text, so that the compiler knows how far rows are apart and needs no rest of a loop."""
 
+_CLONES: Final = """\
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
+__attribute__((target_clones("avx2", "default"))) /* the library fits any x86-64, and is chosen from when it is loaded */
+#endif
+"""
 _ROW: Final = f"[{{}} * {WIDTH} + block_i]"
 _LANES: Final = f"for (block_i = 0; block_i < {WIDTH}; block_i++)"
 
@@ -45,7 +50,7 @@ def block_function(unit: CUnit) -> str:
         "        }",
         "    }",
     ]
-    return function(signature(f"void {unit.name}_block", arguments), body)
+    return _CLONES + function(signature(f"void {unit.name}_block", arguments), body)
 
 
 def _look_up(k: int) -> list[str]:
