@@ -12,11 +12,6 @@ from pidemu.program.ir import Program
 WIDTH: Final = 64
 """Loops in a block: a constant of the text, so that the compiler knows how far rows are apart and needs no rest of a loop."""
 
-_CLONES: Final = """\
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
-__attribute__((target_clones("avx2", "default"))) /* the library fits any x86-64, and is chosen from when it is loaded */
-#endif
-"""
 _ROW: Final = f"[{{}} * {WIDTH} + block_i]"
 _LANES: Final = f"for (block_i = 0; block_i < {WIDTH}; block_i++)"
 
@@ -50,7 +45,7 @@ def block_function(unit: CUnit) -> str:
         "        }",
         "    }",
     ]
-    return _CLONES + function(signature(f"void {unit.name}_block", arguments), body)
+    return function(signature(f"void {unit.name}_block", arguments), body)
 
 
 def _look_up(k: int) -> list[str]:
@@ -74,7 +69,9 @@ def _lane(unit: CUnit, program: Program) -> list[str]:
     text = [variable(unit, n, n in assigned, f"({unit.type(n)}){place}") for n, place in there.items()]
     plain = replace(program, body=tuple(replace(a, text="", unit="") for a in program.body))
     text += [line.partition(" /* ")[0].rstrip() for line in assignments(unit, plain, set(there), branchless=True)]
-    text += [f"    block_states{_ROW.format(k)} = {unit.names[q.name]};" for k, q in enumerate(program.states) if q.name in assigned]
+    text += [
+        f"    block_states{_ROW.format(k)} = {unit.names[q.name]};" for k, q in enumerate(program.states) if q.name in assigned
+    ]
     rows = [f"block_ring{k}{_ROW.format(f'block_row{k}')}" for k in range(len(program.lines))]
     text += [f"    {row} = {unit.names[line.source]};" for row, line in zip(rows, program.lines, strict=True)]
     return [*text, *(f"    block_out{k}{_ROW.format('block_n')} = {unit.names[n]};" for k, n in enumerate(program.recorded))]

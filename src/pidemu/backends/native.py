@@ -33,7 +33,9 @@ from pidemu.program.specialise import specialise
 _FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 _BLOCK_FLAGS: Final = (*_FLAGS, "-O3", "-fno-trapping-math")
 """For blocks: several loops at once, both sides of a choice computed; neither changes a bit."""
+_OWN_PROCESSOR: Final = "-march=native"
 _NAME: Final = "loop"
+__all__ = ["WIDTH", "available", "block", "compiler", "is_compiled", "runner"]
 _Member = tuple[str, type[Any]]
 
 
@@ -122,7 +124,7 @@ def block(structure: Structure) -> Block:
 
 def is_compiled(structure: Structure) -> bool:
     """Tell whether blocks of a structure have been compiled, in this process or an earlier one."""
-    return is_kept(_stem(_block_source(structure), _BLOCK_FLAGS), ".so")
+    return is_kept(_stem(_block_source(structure), _block_flags()), ".so")
 
 
 @functools.lru_cache(maxsize=512)
@@ -132,16 +134,37 @@ def _block_source(structure: Structure) -> str:
 
 @functools.lru_cache(maxsize=512)
 def _block_function(structure: Structure) -> Any:
-    function = _made(_block_source(structure), _BLOCK_FLAGS)[f"{_NAME}_block"]
-    lines, size, pointer = len(structure.lines), [ctypes.c_size_t], [ctypes.c_void_p]
+    function = _made(_block_source(structure), _block_flags())[f"{_NAME}_block"]
+    lines = len(structure.lines)
+    size: list[type[Any]] = [ctypes.c_size_t]
+    pointer: list[type[Any]] = [ctypes.c_void_p]
     arrays = len(structure.inputs) + lines
     function.argtypes = size * 2 + pointer * (2 + arrays) + size * lines + pointer * (lines + len(structure.recorded))
     function.restype = None
     return function
 
 
+def _block_flags() -> tuple[str, ...]:
+    """Return the flags for blocks: for this very processor where it is known, so that no other one loads them."""
+    return (*_BLOCK_FLAGS, _OWN_PROCESSOR) if _processor() else _BLOCK_FLAGS
+
+
+@functools.cache
+def _processor() -> str:
+    """Return what an x86-64 under Linux says it can do; empty elsewhere."""
+    if not (sys.platform == "linux" and platform.machine() == "x86_64"):
+        return ""
+    try:
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
+    except OSError:
+        return ""
+    told = [line for line in first.splitlines() if line.startswith(("cpu family", "model", "stepping", "flags"))]
+    return "\n".join(told) if any(line.startswith("flags") for line in told) else ""
+
+
 def _stem(text: str, flags: Sequence[str]) -> str:
     parts = [text, *compiler(), *flags, sys.platform, platform.machine()]
+    parts += [_processor()] if _OWN_PROCESSOR in flags else []
     return f"scan_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:24]}"
 
 

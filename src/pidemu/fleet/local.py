@@ -10,7 +10,7 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.backends.choice import Choice, block, for_loops, instead, one_by_one
+from pidemu.backends.choice import Choice, Engine, block, for_loops, give_up, instead, one_by_one
 from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block
@@ -109,11 +109,15 @@ class _Threads:
     def _engine(self, group: Group) -> tuple[Choice, Block, int]:
         """Return what runs a group; one that cannot even begin is replaced."""
         asked = self._plan.engine
+        chosen: Engine = asked or "numba"
         try:
             choice = for_loops(group.structure, group.scans, len(group.members), asked)
-            return choice, *block(group.structure, choice.engine)
+            chosen = choice.engine
+            return choice, *block(group.structure, chosen)
         except Exception as error:
-            choice = instead(asked or "numba", error)
+            give_up(chosen)
+            then = None if asked else for_loops(group.structure, group.scans, len(group.members))
+            choice = instead(chosen, error, then)
             return choice, *block(group.structure, choice.engine)
 
     def _run(self, part: Sequence[Prepared], choice: Choice, function: Block, width: int) -> list[BlockOutcome | Failed]:
