@@ -15,7 +15,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, Process
-from pidemu.backends import numba
+from pidemu.backends import native, numba
 from pidemu.backends.cache import warn
 from pidemu.backends.choice import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
 from pidemu.backends.python import starting
@@ -38,7 +38,7 @@ def loop_program() -> Program:
 
 @pytest.fixture
 def compiled(monkeypatch: pytest.MonkeyPatch) -> dict[str, bool]:
-    """What has been compiled or loaded, as the choice is to see it; Numba is imported already."""
+    """What has been compiled or loaded, as the choice is to see it; Numba is imported already, and there is no C compiler."""
     state = {"loaded": False, "compiled": False}
 
     def is_compiled(structure: Structure, *, blocks: bool = False) -> bool:
@@ -49,6 +49,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> dict[str, bool]:
 
     monkeypatch.setattr(numba, "is_compiled", is_compiled)
     monkeypatch.setattr(numba, "is_loaded", is_loaded)
+    monkeypatch.setattr(native, "available", lambda: False)
     monkeypatch.setitem(sys.modules, "numba", sys)  # it is asked for its name only
     return state
 
@@ -96,6 +97,7 @@ def test_many_loops_are_run_by_numpy_or_numba_and_few_by_python(compiled: dict[s
 
 
 def test_without_numba_loops_are_run_by_numpy_or_python_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "available", lambda: False)
     monkeypatch.setattr("pidemu.backends.choice.has_numba", lambda: False)
     program = loop_program()
     assert for_record(program, 10**7) == Choice("python", "Numba is not installed")
@@ -104,6 +106,17 @@ def test_without_numba_loops_are_run_by_numpy_or_python_and_it_is_said(monkeypat
     result = Fleet(alike(30)).simulate(time=20.0)
     assert set(result.engines) == {"numpy"}
     assert pidemu.simulate(alike(1)[0].settings, PROCESS, 0.5, time=20_000).engine == Choice("python", "Numba is not installed")
+
+
+def test_with_a_compiler_fleets_are_run_by_c_where_that_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "available", lambda: True)
+    monkeypatch.setattr(native, "is_compiled", lambda structure: False)
+    monkeypatch.setattr("pidemu.backends.choice._BROKEN", set())
+    structure = loop_program().structure
+    assert for_loops(structure, 5_000, 10_000) == Choice("c", "long enough to be worth compiling")
+    assert for_loops(structure, 100, 30) == Choice("numpy", "many loops, too short to be worth compiling")
+    monkeypatch.setattr(native, "is_compiled", lambda structure: True)
+    assert for_loops(structure, 5_000, 300) == Choice("c", "compiled already")
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -198,7 +211,7 @@ def fresh(program: Program) -> list[Any]:
 def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(engine: Engine) -> None:
     program = loop_program()
     function, most = block(program.structure, engine)
-    width, scans = (most if engine == "numba" else 6), 90
+    width, scans = (most if engine in ("numba", "c") else 6), 90
     lengths = np.array([[1 + 5 * i % 17 for i in range(width)]], dtype=np.int64)
     values = np.array([[x * (1 + 0.001 * i) for i in range(width)] for x in program.values])
     sp, load = (base + 5 * np.sin(np.arange(scans)[:, None] / (5 + np.arange(width))) for base in (50, 0))
@@ -296,6 +309,25 @@ def test_a_controller_goes_on_in_python_where_the_engine_fails(
     monkeypatch.setattr(numba, "runner", broken)
     assert pidemu.Controller(alike(1)[0].settings, 0.5).run(50.0, pv).tolist() == expected.tolist()
     assert failures.messages == [SAID]
+
+
+def test_a_compiler_that_fails_leaves_a_fleet_to_the_next_engine_with_one_line(
+    failures: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def killed(structure: Structure) -> Any:
+        raise EngineError("the C compiler 'cc' does not compile a scan program: exit status -9; name another one in CC")
+
+    monkeypatch.setattr(native, "available", lambda: True)
+    monkeypatch.setattr(native, "is_compiled", lambda structure: True)
+    monkeypatch.setattr(native, "block", killed)
+    monkeypatch.setattr("pidemu.backends.choice.has_numba", lambda: False)
+    expected = Fleet(alike(100)).simulate(time=4_000.0, engine="python")
+    found = Fleet(alike(100)).simulate(time=4_000.0)
+    assert set(found.engines) == {"numpy"}
+    assert found.columns["iae"].tolist() == expected.columns["iae"].tolist()
+    assert len(failures.messages) == 1
+    assert failures.messages[0].startswith("note: the engine 'c' failed (EngineError: the C compiler 'cc' does not compile")
+    assert failures.messages[0].endswith("; the engine 'numpy' runs what it was to run")
 
 
 def test_a_structure_that_takes_long_to_compile_is_weighed_as_that(compiled: dict[str, bool]) -> None:

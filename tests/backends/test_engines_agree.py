@@ -67,13 +67,13 @@ def test_a_controller_gives_the_same_bits_in_every_engine(card_id: str, engine: 
     assert repr(other.events) == repr(reference.events)  # a bump may be NaN
 
 
-@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=NUMBA)])
+@pytest.mark.parametrize("engine", OTHERS)
 @pytest.mark.parametrize("card_id", CARDS)
 def test_loops_side_by_side_give_the_bits_of_loops_alone(card_id: str, engine: Engine) -> None:
     settings = settings_of(card_id)
     program = pidemu.Controller(settings).program
     function, width = block(program.structure, engine)
-    width = width if engine == "numba" else 5
+    width = 5 if engine == "numpy" else width
     records = [record(settings, seed) for seed in range(5)]  # bad samples go straight into the arithmetic
     signals = np.array([[records[i % 5][q.name] for i in range(width)] for q in program.inputs]).transpose(0, 2, 1).copy()
     values, states = (np.repeat(np.array(x)[:, None], width, axis=1) for x in (program.values, program.initial))

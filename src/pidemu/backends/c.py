@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from pidemu.backends.c_block import block_function
 from pidemu.backends.c_expressions import RESERVED
 from pidemu.backends.c_header import MEMBER, prototypes, run_head, step_head, types
 from pidemu.backends.c_unit import CUnit, function, said, scan
@@ -122,6 +123,18 @@ def library(program: Program, name: str) -> str:
     unit = CUnit.of(program, name, own_lines=False)
     general = [scan(unit, unit.program, "scan"), _run(unit, unit.program, "run", "scan")]
     return _joined(["#include <stddef.h>", *_preamble(unit), types(unit), *general, *_automatic(unit)])
+
+
+def block_library(program: Program, name: str) -> str:
+    """Return the function for blocks of loops side by side (`pidemu.backends.c_block`).
+
+    Parameters
+    ----------
+    program, name
+        As in `header`.
+    """
+    unit = CUnit.of(program, name, own_lines=False)
+    return _joined(["#include <stddef.h>", *_preamble(unit), block_function(unit)])
 
 
 def check_name(name: str) -> None:

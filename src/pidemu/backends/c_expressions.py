@@ -14,6 +14,7 @@ _PRECEDENCE: Final = {
     "or": 1, "and": 2, "<": 4, ">": 4, "<=": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
 }  # fmt: skip
 _SYMBOL: Final = {"and": "&&", "or": "||"}
+_BITWISE: Final = {"and": "&", "or": "|"}
 _SELECT: Final = 0
 _UNARY: Final = 7
 _ATOM: Final = 9
@@ -93,9 +94,12 @@ class Writer:
         C name by name of the program.
     floor : str
         The C function for whole numbers; that for float has an ``f`` at the end.
+    branchless : bool
+        Truth values are combined without branches, so that a compiler can compute several loops at once.
     """
 
-    def __init__(self, program: Program, names: Mapping[str, str], floor: str) -> None:
+    def __init__(self, program: Program, names: Mapping[str, str], floor: str, *, branchless: bool = False) -> None:
+        self._symbol = _BITWISE if branchless else _SYMBOL
         self._program = program
         self._names = names
         self._floor = floor
@@ -147,7 +151,7 @@ class Writer:
         else:
             compares = level == _PRECEDENCE["<"]  # and of a < b < c
             one, other = self._wrapped(left, level + compares), self._wrapped(right, level + 1)
-        return f"{one} {_SYMBOL.get(operator, operator)} {other}", level
+        return f"{one} {self._symbol.get(operator, operator)} {other}", level
 
     def _wrapped(self, x: Expr, least: int) -> str:
         text, level = self._render(x)

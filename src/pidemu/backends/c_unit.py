@@ -128,7 +128,7 @@ def scan(unit: CUnit, program: Program, name: str) -> str:
     """
     result = f"{unit.name.upper()}_INLINE {unit.type(program.output)} {unit.name}_{name}"
     head = signature(result, [*unit.pointers, *unit.arguments(program, "{} {}"), *unit.also])
-    wanted = _wanted(program)
+    wanted = read_first(program)
     assigned = {a.name for a in program.body}
     coefficients = [q.name for q in program.coefficients if q.name in wanted]
     kept = [q.name for q in program.states if q.name in wanted]
@@ -136,21 +136,21 @@ def scan(unit: CUnit, program: Program, name: str) -> str:
     body = [f"    (void){unit.names[q.name]};" for q in program.inputs if q.name not in wanted]
     body += ["    (void)settings;"] if not coefficients else []
     body += ["    (void)state;"] if not (kept or stored or program.lines) else []
-    body += [_variable(unit, n, n in assigned, f"settings->{unit.names[n]}") for n in coefficients]
-    body += [_variable(unit, n, n in assigned, f"state->{unit.names[n]}") for n in kept]
+    body += [variable(unit, n, n in assigned, f"settings->{unit.names[n]}") for n in coefficients]
+    body += [variable(unit, n, n in assigned, f"state->{unit.names[n]}") for n in kept]
     delayed = [line for line in program.lines if line.name in wanted]
     for line in delayed:
         place = f"state->{unit.line(line)}"
-        body.append(said(_variable(unit, line.name, False, f"{place}[{place}_at]"), line.text))
+        body.append(said(variable(unit, line.name, False, f"{place}[{place}_at]"), line.text))
     there = {*coefficients, *kept, *(line.name for line in delayed), *(q.name for q in program.inputs)}
-    body += _assignments(unit, program, there)
+    body += assignments(unit, program, there)
     body += [f"    state->{unit.names[n]} = {unit.names[n]};" for n in stored]
     body += [text for line in program.lines for text in _entering(unit, line)]
     body += [f"    *{unit.names[n]}_out = {unit.names[n]};" for n in program.also]
     return function(head, [*body, f"    return {unit.names[program.output]};"])
 
 
-def _wanted(program: Program) -> set[str]:
+def read_first(program: Program) -> set[str]:
     """Return what a scan reads before it assigns it."""
     wanted: set[str] = set()
     assigned: set[str] = set()
@@ -160,18 +160,21 @@ def _wanted(program: Program) -> set[str]:
     return wanted | ({*program.recorded, *(line.source for line in program.lines)} - assigned)
 
 
-def _variable(unit: CUnit, name: str, changes: bool, value: str) -> str:
+def variable(unit: CUnit, name: str, changes: bool, value: str) -> str:
+    """Return the declaration of a variable; one that does not change is a constant."""
     return f"    {'' if changes else 'const '}{unit.type(name)} {unit.names[name]} = {value};"
 
 
-def _assignments(unit: CUnit, program: Program, there: set[str]) -> Iterable[str]:
+def assignments(unit: CUnit, program: Program, there: set[str], *, branchless: bool = False) -> Iterable[str]:
+    """Yield the assignments of a scan; names that are not there yet are declared. See `Writer` for `branchless`."""
+    writer = Writer(unit.program, unit.names, unit.floor, branchless=branchless)
     times = [a.name for a in program.body]
     for assign in explicit(program):
-        value = unit.writer.text(assign.value)
+        value = writer.text(assign.value)
         if assign.name in there:
             code = f"    {unit.names[assign.name]} = {value};"
         else:
-            code = _variable(unit, assign.name, times.count(assign.name) > 1, value)
+            code = variable(unit, assign.name, times.count(assign.name) > 1, value)
             there = there | {assign.name}
         yield said(code, f"{assign.text} [{assign.unit}]")
 

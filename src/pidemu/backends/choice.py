@@ -35,6 +35,10 @@ _COMPILE: Final = 0.7
 """Seconds in which it compiles a structure of up to a hundred assignments."""
 _LONGER: Final = 1.5
 """With what power of their number the seconds grow beyond that."""
+_COMPILE_C: Final = 0.3
+"""Seconds in which a C compiler makes a block of up to a hundred assignments; its blocks are quicker than Numba's, too."""
+_LOAD_C: Final = 0.005
+"""Seconds to load a block of C that was compiled."""
 _LOAD: Final = 0.05
 """Seconds to load one that was compiled."""
 _CALL: Final = 2e-4
@@ -129,16 +133,37 @@ def for_loops(structure: Structure, scans: int, loops: int, forced: Engine | Non
     if forced is not None:
         return Choice(forced, _ASKED)
     alone: Choice = Choice("numpy", "many loops") if loops >= _LOOPS_FOR_NUMPY else Choice("python", "few loops")
+    otherwise = _PYTHON * len(structure.body) * scans * loops / (8 if alone.engine == "numpy" else 1)
+    if _has_c():
+        found = _weighed_c(structure, otherwise)
+        return found if found.engine == "c" else Choice(alone.engine, f"{alone.reason}, {found.reason}")
     if without := _no_numba():
         return Choice(alone.engine, f"{alone.reason}, and {without}")
-    in_python = _PYTHON * len(structure.body) * scans * loops
-    found = _weighed(structure, in_python / (8 if alone.engine == "numpy" else 1), blocks=True)
+    found = _weighed(structure, otherwise, blocks=True)
     return found if found.engine == "numba" else Choice(alone.engine, f"{alone.reason}, {found.reason}")
 
 
 def _no_numba() -> str:
     """Return why Numba is not chosen, whatever it would save; empty where it may be."""
     return "Numba does not work here" if "numba" in _BROKEN else "" if has_numba() else "Numba is not installed"
+
+
+def _has_c() -> bool:
+    """Tell whether a C compiler is there and has not failed."""
+    from pidemu.backends import native
+
+    return "c" not in _BROKEN and native.available()
+
+
+def _weighed_c(structure: Structure, otherwise: float) -> Choice:
+    """Weigh the seconds without C against those that the compiler needs."""
+    from pidemu.backends import native
+
+    if otherwise > _LOAD_C and native.is_compiled(structure):
+        return Choice("c", "compiled already")
+    if otherwise > _COMPILE_C * max(1.0, len(structure.body) / 100) ** _LONGER:
+        return Choice("c", "long enough to be worth compiling")
+    return Choice("python", "too short to be worth compiling")
 
 
 def _weighed(structure: Structure, otherwise: float, *, blocks: bool) -> Choice:
@@ -210,8 +235,8 @@ def safe_runner(program: Program, choice: Choice) -> Runner:
     return Runner(safe(quick.run, plain.run), safe(quick.run_automatic, plain.run_automatic), quick.read_in_automatic)
 
 
-def instead(engine: Engine, error: Exception) -> Choice:
-    """Return what runs something after an engine failed: plain Python, which needs nothing, and gives the same bits; say so.
+def instead(engine: Engine, error: Exception, then: Choice | None = None) -> Choice:
+    """Return what runs something after an engine failed, by default plain Python, which needs nothing; say so.
 
     Parameters
     ----------
@@ -219,13 +244,21 @@ def instead(engine: Engine, error: Exception) -> Choice:
         What failed.
     error : Exception
         How.
+    then : Choice, optional
+        What runs it instead.
     """
-    if engine == "numba":  # whatever is wrong with it, such as a library it does not fit, is wrong with every program
-        _BROKEN.add(engine)
+    give_up(engine)
+    next_one = "plain Python" if then is None or then.engine == "python" else f"the engine '{then.engine}'"
     if engine != "python":
         first = next(iter(str(error).splitlines()), "")
-        warn(f"the engine '{engine}' failed ({type(error).__name__}: {first[:200]}); plain Python runs what it was to run")
-    return Choice("python", f"{engine} failed")
+        warn(f"the engine '{engine}' failed ({type(error).__name__}: {first[:200]}); {next_one} runs what it was to run")
+    return then or Choice("python", f"{engine} failed")
+
+
+def give_up(engine: Engine) -> None:
+    """Choose a compiler no more: what is wrong with it, such as a library it does not fit, is wrong with every program."""
+    if engine in ("numba", "c"):
+        _BROKEN.add(engine)
 
 
 def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
@@ -236,7 +269,7 @@ def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
     structure : Structure
         What the loops have in common.
     engine : {"python", "numpy", "numba", "c"}
-        The engine. Plain Python and C run one loop after the other.
+        The engine. Plain Python runs one loop after the other.
     """
     if engine == "numba":
         from pidemu.backends import numba
@@ -246,6 +279,10 @@ def block(structure: Structure, engine: Engine) -> tuple[Block, int]:
         from pidemu.backends import numpy
 
         return numpy.block(structure), numpy.WIDTH
+    if engine == "c":
+        from pidemu.backends import native
+
+        return native.block(structure), native.WIDTH
     return one_by_one(structure, engine), 64
 
 

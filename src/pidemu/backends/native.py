@@ -20,17 +20,22 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pidemu.arrays import Floats
-from pidemu.backends.c import library
-from pidemu.backends.cache import folder, keep, load
+from pidemu.arrays import Floats, Integers
+from pidemu.backends.c import block_library, library
+from pidemu.backends.c_block import WIDTH
+from pidemu.backends.cache import folder, is_kept, keep, load
 from pidemu.backends.python import in_precision
-from pidemu.backends.runner import Run, Runner
+from pidemu.backends.runner import Block, Run, Runner
 from pidemu.errors import EngineError
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 
 _FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+_BLOCK_FLAGS: Final = (*_FLAGS, "-O3", "-fno-trapping-math")
+"""For blocks: several loops at once, both sides of a choice computed; neither changes a bit."""
+_OWN_PROCESSOR: Final = "-march=native"
 _NAME: Final = "loop"
+__all__ = ["WIDTH", "available", "block", "compiler", "is_compiled", "runner"]
 _Member = tuple[str, type[Any]]
 
 
@@ -88,6 +93,88 @@ def runner(program: Program) -> Runner:
     return Runner(run, run if fewer == inputs else _over(program, compiled, settings, "run_automatic", fewer), fewer)
 
 
+def block(structure: Structure) -> Block:
+    """Return what runs blocks of `WIDTH` loops of a structure.
+
+    Parameters
+    ----------
+    structure : Structure
+        What the loops have in common.
+
+    Raises
+    ------
+    EngineError
+        There is no C compiler, it does not compile what is printed, or there is no room for what it makes.
+    """
+    function = _block_function(structure)
+
+    def run(values: Floats, states: Floats, signals: Floats, rings: Floats, lengths: Integers, at: int, records: Floats) -> None:
+        scans = records.shape[1]
+        if any(x.shape[-1] != WIDTH for x in (values, states, rings, lengths, records)) or signals.shape[1:] != (scans, WIDTH):
+            raise ValueError(f"blocks of {WIDTH} loops, not arrays of shapes {[x.shape for x in (values, signals, records)]}")
+        read = [np.ascontiguousarray(x) for x in (values, *signals, *lengths)]
+        assert all(x.flags.c_contiguous for x in (states, *rings, *records))  # what is written to must not be a copy
+        inputs, delays = read[1 : 1 + len(signals)], read[1 + len(signals) :]
+        rows = [rings.shape[1]] * len(rings)
+        arrays = [[x.ctypes.data for x in some] for some in (inputs, rings, delays, records)]
+        function(at, scans, read[0].ctypes.data, states.ctypes.data, *arrays[0], *arrays[1], *rows, *arrays[2], *arrays[3])
+
+    return run
+
+
+def is_compiled(structure: Structure) -> bool:
+    """Tell whether blocks of a structure have been compiled, in this process or an earlier one."""
+    return is_kept(_stem(_block_source(structure), _block_flags()), ".so")
+
+
+@functools.lru_cache(maxsize=512)
+def _block_source(structure: Structure) -> str:
+    return block_library(structure.bare(), _NAME)
+
+
+@functools.lru_cache(maxsize=512)
+def _block_function(structure: Structure) -> Any:
+    function = _made(_block_source(structure), _block_flags())[f"{_NAME}_block"]
+    lines = len(structure.lines)
+    size: list[type[Any]] = [ctypes.c_size_t]
+    pointer: list[type[Any]] = [ctypes.c_void_p]
+    arrays = len(structure.inputs) + lines
+    function.argtypes = size * 2 + pointer * (2 + arrays) + size * lines + pointer * (lines + len(structure.recorded))
+    function.restype = None
+    return function
+
+
+def _block_flags() -> tuple[str, ...]:
+    """Return the flags for blocks: for this very processor where it is known, so that no other one loads them."""
+    return (*_BLOCK_FLAGS, _OWN_PROCESSOR) if _processor() else _BLOCK_FLAGS
+
+
+@functools.cache
+def _processor() -> str:
+    """Return what an x86-64 under Linux says it can do; empty elsewhere."""
+    if not (sys.platform == "linux" and platform.machine() == "x86_64"):
+        return ""
+    try:
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
+    except OSError:
+        return ""
+    told = [line for line in first.splitlines() if line.startswith(("cpu family", "model", "stepping", "flags"))]
+    return "\n".join(told) if any(line.startswith("flags") for line in told) else ""
+
+
+def _stem(text: str, flags: Sequence[str]) -> str:
+    parts = [text, *compiler(), *flags, sys.platform, platform.machine()]
+    parts += [_processor()] if _OWN_PROCESSOR in flags else []
+    return f"scan_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:24]}"
+
+
+def _made(text: str, flags: Sequence[str]) -> ctypes.CDLL:
+    """Return a text as a library, from the cache folder where it was compiled before."""
+    stem = _stem(text, flags)
+    kept = load(stem, ".so")
+    return _loaded(_compile((*compiler(), *flags), text, stem) if kept is None else kept[0])
+
+
 @dataclass(frozen=True, slots=True)
 class _Compiled:
     """A structure as machine code, with its two types."""
@@ -101,12 +188,7 @@ class _Compiled:
 @functools.lru_cache(maxsize=512)
 def _compiled(structure: Structure) -> _Compiled:
     program = structure.bare()
-    command = (*compiler(), *_FLAGS)
-    text = library(program, _NAME)
-    built = hashlib.sha256("\0".join([text, *command, sys.platform, platform.machine()]).encode()).hexdigest()[:24]
-    stem = f"scan_{built}"
-    kept = load(stem, ".so")
-    path = _compile(command, text, stem) if kept is None else kept[0]
+    made = _made(library(program, _NAME), _FLAGS)
     lines: list[_Member] = []
     for line in program.lines:
         lines += [
@@ -115,7 +197,7 @@ def _compiled(structure: Structure) -> _Compiled:
             (f"{line.name}_at", ctypes.c_size_t),
         ]
     return _Compiled(
-        _loaded(path),
+        made,
         _structure("Settings", [(q.name, _c_type(program, q.name)) for q in program.coefficients]),
         _structure("State", [(q.name, _c_type(program, q.name)) for q in program.states] + lines),
         tuple(q.name for q in specialise(program).inputs),

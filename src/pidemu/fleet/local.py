@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.backends.choice import Choice, block, for_loops, instead, one_by_one
+from pidemu.backends.choice import Choice, Engine, block, for_loops, give_up, instead, one_by_one
 from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block
@@ -20,8 +20,10 @@ from pidemu.processes import processors
 
 _ONE_AT_A_TIME: Final = ("python", "numpy")
 """Engines that threads hold up more than they help: each keeps the interpreter's lock most of the time."""
-_SIDE_BY_SIDE: Final = ("numpy", "numba")
+_SIDE_BY_SIDE: Final = ("numpy", "numba", "c")
 """Engines that take about as long for a block as for its longest loop; the others run one loop after the other."""
+_FIXED: Final = ("numba", "c")
+"""Engines whose blocks have one width: it is a constant of what they compile."""
 _TURN: Final = threading.Lock()
 _AT_ONCE: Final = 8192
 """Loops that are prepared, and then run, at a time: what is in memory does not grow with the fleet."""
@@ -29,7 +31,7 @@ _AT_ONCE_KEPT: Final = 2048
 """The same where signals are kept: preparing them takes 2 to 10 s, and until it is over nothing is complete."""
 _WORK: Final = 2**22
 """Loops times scans of a block whose signals are kept: some 3 s in plain Python. A run that is killed loses them."""
-_NARROWEST: Final = {"numpy": 1024, "numba": 64}
+_NARROWEST: Final = {"numpy": 1024, "numba": 64, "c": 64}
 """Loops below which a block is not made narrower: half as wide, these engines take longer for the same (1.6 and 2 times)."""
 _LOOK: Final = 0.5
 """Seconds after which a wait begins anew: where the system does not interrupt one, Ctrl-C is seen then."""
@@ -91,18 +93,22 @@ class _Threads:
             function = _in_turn(function)
         widest = width if self._room is None else min(width, max(_NARROWEST.get(choice.engine, 1), _WORK // group.mean_scans))
         for part in group.parts(widest, 2 if choice.engine in _SIDE_BY_SIDE else 1):
-            lanes = width if choice.engine == "numba" else len(part)
+            lanes = width if choice.engine in _FIXED else len(part)
             self._pool.submit(self._run, part, choice, function, lanes).add_done_callback(self._done.put)
             self._left += 1
 
     def _engine(self, group: Group) -> tuple[Choice, Block, int]:
         """Return what runs a group; one that cannot even begin is replaced."""
         asked = self._plan.engine
+        chosen: Engine = asked or "numba"
         try:
             choice = for_loops(group.structure, group.mean_scans, len(group), asked)
-            return choice, *block(group.structure, choice.engine)
+            chosen = choice.engine
+            return choice, *block(group.structure, chosen)
         except Exception as error:
-            choice = instead(asked or "numba", error)
+            give_up(chosen)
+            then = None if asked else for_loops(group.structure, group.mean_scans, len(group))
+            choice = instead(chosen, error, then)
             return choice, *block(group.structure, choice.engine)
 
     def _run(self, part: Group, choice: Choice, function: Block, width: int) -> list[BlockOutcome | Failed]:
