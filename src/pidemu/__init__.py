@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
     from pidemu.simulation.simulate import Simulation, simulate
-    from pidemu.tuning.optimise import Optimum, optimise
+    from pidemu.tuning.optimise import OptimalTuning, optimise
     from pidemu.tuning.rules import TuningRule, tuning_rules
     from pidemu.tuning.tune import Tuning, tune
 
@@ -114,7 +114,7 @@ _HOMES = {
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
     "Tuning": "tuning.tune",
-    "Optimum": "tuning.optimise",
+    "OptimalTuning": "tuning.optimise",
     "optimise": "tuning.optimise",
     "tune": "tuning.tune",
     "TuningRule": "tuning.rules",
@@ -142,7 +142,7 @@ __all__ = [
     "Law",
     "Loop",
     "LoopTable",
-    "Optimum",
+    "OptimalTuning",
     "PidemuError",
     "Process",
     "ProcessError",

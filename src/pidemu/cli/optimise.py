@@ -26,7 +26,7 @@ from pidemu.plausible import plain_number
 from pidemu.process.process import parse_process
 from pidemu.settings.ranges import SignalRange
 from pidemu.tuning.criteria import CRITERIA, DISTURBANCES, LIMITS
-from pidemu.tuning.optimise import Optimum, optimise
+from pidemu.tuning.optimise import OptimalTuning, optimise
 
 _FIGURES: Final = {
     "IAE, load step of 1 % [% s]": "iae",
@@ -125,7 +125,7 @@ def _number(text: object) -> object:
         return text
 
 
-def _print(o: Optimum) -> None:
+def _print(o: OptimalTuning) -> None:
     s = o.settings
     heading(s.card.title + (f"  [{s.variant.choice_text}]" if s.options else ""))
     rows = [[name, number(v.value), unit_of(v), other_units(v)] for name, v in s.items() if v.active]

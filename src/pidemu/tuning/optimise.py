@@ -51,7 +51,7 @@ _POPULATION: Final = 24
 _GENERATIONS: Final = {1: 12, 2: 18, 3: 26}
 _REFINED: Final = 8
 """Rounds of a search close to the best."""
-_WIDE: Final = 20.0
+_AROUND: Final = 20.0
 """Factor around the rules' numbers within which the best is sought."""
 _TERMS: Final = {"P": 1, "PI": 2, "PID": 3}
 _REPEATS: Final = 3
@@ -85,7 +85,7 @@ class RuleAnswer:
 
 
 @dataclass(frozen=True)
-class Optimum:
+class OptimalTuning:
     """The best settings that were found.
 
     Attributes
@@ -172,7 +172,7 @@ def optimise(
     op_range: RangeGiven | None = None,
     action: str | None = None,
     digits: int | None = None,
-) -> Optimum:
+) -> OptimalTuning:
     """Find the settings of a card that are best for a process, on its exact sampled loop in the linear range.
 
     Parameters
@@ -204,7 +204,7 @@ def optimise(
 
     Returns
     -------
-    Optimum
+    OptimalTuning
         Settings and figures, and what every tuning rule that serves would have given.
 
     Raises
@@ -389,7 +389,7 @@ class _Search:
         if not starts:
             raise TuningError("no tuning rule's answer has all the terms that are sought; give controller='PI' or 'P'")
         points = np.log(np.array(starts))
-        low, high = points.min(axis=0) - math.log(_WIDE), points.max(axis=0) + math.log(_WIDE)
+        low, high = points.min(axis=0) - math.log(_AROUND), points.max(axis=0) + math.log(_AROUND)
         random = np.random.default_rng(0)
         population = np.clip(points[random.integers(len(points), size=_POPULATION * self.terms)], low, high)
         population = np.clip(population + random.normal(0, 0.5, population.shape), low, high)
@@ -439,7 +439,7 @@ class _Search:
 
 def _concluded(
     search: _Search, best: Floats, tunings: tuple[Tuning, ...], digits: int | None, process: Process, family: tuple[Process, ...]
-) -> Optimum:
+) -> OptimalTuning:
     """Return the optimum with its exact figures; limits that these break are drawn tighter first."""
     for _ in range(_REPEATS):
         settings = search.settings(best)
@@ -459,7 +459,7 @@ def _concluded(
     value, _, figures = search.judged([search.law(settings)])
     main = dataclasses.replace(exact[0], iae=load_iae(settings, process, search.scan))
     bounds = {name: worst.get(name, float(x[0])) for name, x in figures.items()}
-    return Optimum(
+    return OptimalTuning(
         settings, search.criterion, search.disturbance, float(value[0]), search.limits, bounds, process, family, main,
         search.first.action, search.scan, tuple(search.answers(tunings)),
     )  # fmt: skip
