@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
@@ -194,6 +197,8 @@ def test_the_command_prints_dials_limits_figures_and_rules() -> None:
 
 def test_the_command_gives_plain_values() -> None:
     found = strict_json(told(*COMMAND, "--json"))
+    schema = json.loads((Path(__file__).parents[2] / "specs" / "optimum.schema.json").read_text("utf-8"))
+    jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
     best = pidemu.optimise("emerson/deltav", LAG, limits={"Ms": 1.6}, scan=0.5, digits=5)
     assert found["settings"]["GAIN"] == {"value": best.settings["GAIN"].value, "unit": "%/%"}
     assert found["figures"]["Ms"] <= 1.6 * (1 + 1e-3)

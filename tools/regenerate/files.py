@@ -61,7 +61,7 @@ _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/conversion.schema.json", lambda _: conversion_schema.text()),
     Generated("specs/fit.schema.json", lambda _: process_schemas.fit_text()),
     Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
-    *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "robustness", "bode")),
+    *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "optimum", "robustness", "bode")),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),
     Generated("docs/matrix.md", lambda _: matrix.page()),

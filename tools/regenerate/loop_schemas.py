@@ -1,4 +1,4 @@
-"""The JSON Schemas of ``pidemu tune --json``, ``pidemu robustness --json`` and ``pidemu bode --json``."""
+"""The JSON Schemas of ``pidemu tune``, ``optimise``, ``robustness`` and ``bode`` with ``--json``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field, RootModel
 from pidemu.analysis import frequency, robustness
 from pidemu.conversion.schema import Dial, Line, Name
 from pidemu.files.documents import DocumentPart, Number
-from pidemu.tuning import tune
+from pidemu.tuning import optimise, tune
 
 Numbers = list[Number]
 
@@ -73,6 +73,55 @@ class AllRulesPart(DocumentPart):
     refused: dict[Name, str] = Field(description="Why the other rules give nothing, by rule.")
 
 
+class OptimalFigures(Figures):
+    """The sampled loop in figures, and what was bounded."""
+
+    overshoot: Number | None = None
+    output_overshoot: Number | None = None
+    decay_ratio: Number | None = None
+    noise_gain: Number | None = None
+    travel: Number | None = None
+
+
+class CriterionPart(DocumentPart):
+    """What the settings are best by."""
+
+    name: Literal["iae", "ise", "itae", "ie"]
+    disturbance: Literal["load", "setpoint"]
+    value: Number = Field(description="Per step of 1 %; of several processes the worst.")
+
+
+class AnswerPart(DocumentPart):
+    """What a rule would have given."""
+
+    rule: Name
+    criterion: Number
+    within_limits: bool
+    card: Name
+    settings: dict[Name, Dial]
+    options: dict[Name, str]
+    pv_range: Any = None
+    op_range: Any = None
+
+
+class OptimumPart(DocumentPart):
+    """What ``pidemu optimise --json`` prints."""
+
+    schema_: Literal["pidemu-optimum-1"] = Field(alias="schema", description="Name and version of this form.")
+    pidemu: Name = Field(description="Version of pidemu.")
+    card: Name
+    settings: dict[Name, Dial]
+    options: dict[Name, str]
+    gains: Gains
+    figures: OptimalFigures
+    criterion: CriterionPart
+    limits: dict[Name, Number] = Field(description="What was not to be exceeded.")
+    action: Literal["reverse", "direct"] = Field(description="The action that makes the feedback negative.")
+    process: Line
+    family: list[Line] = Field(description="Further processes that the settings serve.")
+    rules: list[AnswerPart] = Field(description="What every rule that serves would have given, the best first.")
+
+
 class TuneOutcome(RootModel[TuningPart | AllRulesPart]):
     """What ``pidemu tune --json`` prints."""
 
@@ -123,13 +172,14 @@ class BodePart(DocumentPart):
 
 _FORMS: dict[str, tuple[str, Any]] = {
     "tuning": (tune.SCHEMA, TuneOutcome),
+    "optimum": (optimise.SCHEMA, OptimumPart),
     "robustness": (robustness.SCHEMA, RobustnessPart),
     "bode": (frequency.SCHEMA, BodePart),
 }
 
 
 def text(name: str) -> str:
-    """Return the file of a schema: of ``tuning``, ``robustness`` or ``bode``."""
+    """Return the file of a schema: of ``tuning``, ``optimum``, ``robustness`` or ``bode``."""
     title, model = _FORMS[name]
     plain = model.model_json_schema(by_alias=True, mode="serialization")
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
