@@ -29,6 +29,39 @@ The loop
   load step      10 % at 180 s
 
 Result, errors from the load step on
+  IAE                                   75  % s
+  largest error                      2.628  %
+  travel of the output                53.8  %
+  at the low limit                       0  s
+  at the high limit                      0  s
+  range of the error at the end   0.003675  %
+  last error                     2.953e-06  %
+  settled at the end                   yes
+
+Responses, from each step on
+                                 setpoint       load
+  step                                 10         10  %
+  IE                                122.5        -75  % s
+  IAE                               134.5         75  % s
+  ISE                               987.3      130.1  %^2 s
+  ITAE                               1276       2081  % s^2
+  largest error, or overshoot       0.189      2.628  %
+  overshoot                        0.0189          -  -
+  decay ratio                           0          0  -
+  rise time, 10 to 90 %             13.91          -  s
+  settling time, 5 %                22.79      67.37  s
+  largest move of the output        25.83      10.72  %
+  travel of the output              42.36      11.44  %
+  last error                   -1.532e-05  2.953e-06  %
+
+Margins, sampled and within the limits
+  gain margin          2.974
+  phase margin [deg]    59.6
+  delay margin [s]     8.938
+  crossover [rad/s]   0.1164
+  Ms                    1.64
+  Mt                    1.04
+  stable                 yes
 """
 
 
@@ -210,3 +243,39 @@ def test_a_run_that_ends_in_the_dead_time_says_nothing_about_settling() -> None:
         in err
     )
     assert strict_json(said(*words, "--json").out)["settled"] is None
+
+
+LOOP = ("simulate", "fisher/provox", "GAIN=2", "RESET=4", "RATE=0", "--process", "gain=1,lag=20,delay=3", "--scan", "1")
+
+
+def test_responses_are_told_step_by_step_and_beside_those_of_another_controller() -> None:
+    found = strict_json(told(*LOOP, "--json", "--beside", "emerson/deltav GAIN=2 RESET='15 s'"))
+    assert [response["step"] for response in found["responses"]] == ["setpoint", "load"]
+    (other,) = found["beside"]
+    assert other["card"] == "emerson/deltav"
+    assert other["responses"] == found["responses"]  # the same law, scan by scan
+    text = told(*LOOP, "--beside", "generic/standard K=1 Ti=20 Td=0")
+    assert "Responses, from each step on" in text
+    assert "Responses of generic/standard: K 1, Ti 20, Td 0" in text
+
+
+def test_responses_are_drawn(tmp_path: Path) -> None:
+    for name in ("loop.png", "loop.svg"):
+        told(*LOOP, "--plot", str(tmp_path / name), "--beside", "generic/standard K=1 Ti=20 Td=0")
+        assert (tmp_path / name).stat().st_size > 5_000
+    assert "generic/standard: K 1, Ti 20, Td 0" in (tmp_path / "loop.svg").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--beside", "emerson/deltav GAIN='2"), "is not a card with settings"),
+        (("--beside", ""), "is not a card with settings"),
+        (("--beside", "emerson/delta GAIN=2"), "did you mean 'emerson/deltav'?"),
+        (("--plot", "loop.gif"), "pictures are written as .png or .svg"),
+    ],
+)
+def test_another_controller_or_a_picture_that_is_wrong_is_told(words: tuple[str, str], message: str) -> None:
+    result = said(*LOOP, *words)
+    assert result.status != 0
+    assert message in result.err

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, Final
 
 import click
 
 from pidemu.analysis.loop_figures import LoopFigures
-from pidemu.backends.choice import Choice, checked
+from pidemu.backends.choice import Choice, Engine, checked
 from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.cli.common import (
@@ -30,8 +32,10 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
+from pidemu.cli.loop import check_plot, plot_option
 from pidemu.cli.outputs import check_outputs, inputs
-from pidemu.errors import RecordError
+from pidemu.errors import RecordError, SettingError
+from pidemu.excerpt import quoted
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
@@ -39,8 +43,10 @@ from pidemu.formatting import json_safe
 from pidemu.process.process import parse_process
 from pidemu.records.files import Record, write_record
 from pidemu.settings.action import Action
+from pidemu.settings.settings import Settings
 from pidemu.simulation.outcome import margins_of, settled_by, stability_of
-from pidemu.simulation.simulate import run_trial
+from pidemu.simulation.response import UNITS, ResponseFigures, response_figures
+from pidemu.simulation.simulate import Simulation, ran, simulate
 from pidemu.simulation.trial import Step, Trial, trial
 
 _ACTIONS: Final[Mapping[str | None, Action | None]] = {None: None, "reverse": "reverse", "direct": "direct"}
@@ -52,6 +58,21 @@ _NAMES: Final = {
     "at_high": "at the high limit",
     "swing": "range of the error at the end",
     "error": "last error",
+}
+_RESPONSES: Final = {
+    "size": "step",
+    "ie": "IE",
+    "iae": "IAE",
+    "ise": "ISE",
+    "itae": "ITAE",
+    "largest_error": "largest error, or overshoot",
+    "overshoot": "overshoot",
+    "decay_ratio": "decay ratio",
+    "rise_time": "rise time, 10 to 90 %",
+    "settling_time": "settling time, 5 %",
+    "peak_output": "largest move of the output",
+    "travel": "travel of the output",
+    "last_error": "last error",
 }
 _SETTLED: Final = {True: "yes", False: "NO", None: "not known"}
 _MARGINS: Final = {
@@ -93,6 +114,14 @@ _MARGINS: Final = {
     metavar="FILE.csv",
     help="Write time, setpoint, measurement and output of every scan.",
 )
+@plot_option
+@click.option(
+    "--beside",
+    "others",
+    multiple=True,
+    metavar='"CARD NAME=VALUE..."',
+    help="Another controller in the same loop, with the same steps: in the picture, and its responses in the table. Repeatable.",
+)
 @vendors_option
 @json_option
 def command(
@@ -107,6 +136,8 @@ def command(
     limits: tuple[float, float] | None,
     engine: str | None,
     target: str | None,
+    picture: str | None,
+    others: tuple[str, ...],
     vendors: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -118,19 +149,30 @@ def command(
     settings, process = load_card(card, vendors).settings(assignments(values)), parse_process(model)
     read = inputs()
     check_outputs({"--out": target}, RecordError, read)  # now, and not after the work
+    check_plot(picture)
+    further = [_other(words, vendors) for words in others]
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
     made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
-    pv, out, choice = run_trial(made, forced)
+    run = ran(made, forced)
+    runs = {_name(settings): run} | {_name(s): _in_the_same_loop(s, run, scan, forced) for s in further}
+    if picture is not None:
+        from pidemu.report.response_plot import plot_responses
+
+        plot_responses(picture, runs, process.text)
+    pv, out, choice = run.measurement, run.output, run.engine
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
         with beside(target, RecordError, read) as stream:
             write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
-    figures = figures_of(made, pv, out)
+    figures, responses = figures_of(made, pv, out), response_figures(run)
     margins = margins_of(made)
     if as_json:
-        print_json(_plain(made, choice, figures, margins))
+        beside_it = [{**r.settings.to_dict(), "responses": _told(response_figures(r))} for r in list(runs.values())[1:]]
+        print_json(_plain(made, choice, figures, margins, responses) | ({"beside": beside_it} if beside_it else {}))
     else:
-        _print(made, choice if engine else None, figures, margins)
+        _print(made, choice if engine else None, figures, margins, responses)
+        for name, r in list(runs.items())[1:]:
+            _print_responses(response_figures(r), f"\nResponses of {name}")
     for note in (*settings.notes, *_notes(made, kind, margins, settled_by(made, figures))):
         echo(f"note: {note}", err=True)
 
@@ -151,7 +193,9 @@ def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, sett
         yield f"a scan interval of {number(made.scan)} s is long for these settings: {what}"
 
 
-def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: LoopFigures | None) -> dict[str, Any]:
+def _plain(
+    made: Trial, choice: Choice, figures: Mapping[str, float], margins: LoopFigures | None, responses: Sequence[ResponseFigures]
+) -> dict[str, Any]:
     """Return everything as plain values, but for the signals."""
     plain = {
         **made.settings.to_dict(),
@@ -164,6 +208,7 @@ def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: L
         "load": made.load_step,
         "engine": {"name": choice.engine, "reason": choice.reason},
         "figures": dict(figures),
+        "responses": _told(responses),
         "settled": settled_by(made, figures),
         "stable": stability_of(made, margins),
         "margins": None if margins is None else {name: getattr(margins, name) for name in ("stable", *_MARGINS.values())},
@@ -172,7 +217,13 @@ def _plain(made: Trial, choice: Choice, figures: Mapping[str, float], margins: L
     return safe
 
 
-def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], margins: LoopFigures | None) -> None:
+def _print(
+    made: Trial,
+    choice: Choice | None,
+    figures: Mapping[str, float],
+    margins: LoopFigures | None,
+    responses: Sequence[ResponseFigures],
+) -> None:
     s, low, high = made.settings, *made.limits
     heading(s.card.title + (f"  [{s.variant.choice_text}]" if s.options else ""))
     rows = [
@@ -196,10 +247,53 @@ def _print(made: Trial, choice: Choice | None, figures: Mapping[str, float], mar
     settled = _SETTLED[settled_by(made, figures)]
     rows = [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()]
     table(["", "", ""], [*rows, ["settled at the end", settled, ""]], right=(1,))
+    _print_responses(responses, "\nResponses, from each step on")
     if margins is not None:
         heading("\nMargins, sampled and within the limits")
         rows = [[name, _short(getattr(margins, attribute))] for name, attribute in _MARGINS.items()]
         table(["", ""], [*rows, ["stable", "yes" if margins.stable else "NO"]], right=(1,))
+
+
+def _print_responses(responses: Sequence[ResponseFigures], title: str) -> None:
+    if responses:
+        heading(title)
+        names = [name for name in UNITS if any(not math.isnan(getattr(r, name)) for r in responses)]
+        rows = [[_RESPONSES[name], *(_short(getattr(r, name)) for r in responses), UNITS[name]] for name in names]
+        table(["", *(r.step for r in responses), ""], rows, right=tuple(range(1, len(responses) + 1)))
+
+
+def _told(responses: Sequence[ResponseFigures]) -> list[dict[str, Any]]:
+    told: list[dict[str, Any]] = json_safe([asdict(response) for response in responses])
+    return told
+
+
+def _other(words: str, vendors: tuple[str, ...]) -> Settings:
+    """Return the settings of another controller, as they stand behind a command."""
+    try:
+        card, *values = shlex.split(words)
+    except ValueError:  # an open quotation mark, or nothing
+        raise SettingError(f"--beside '{quoted(words)}' is not a card with settings; write \"CARD NAME=VALUE...\"") from None
+    return load_card(card, vendors).settings(assignments(values))
+
+
+def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, forced: Engine | None) -> Simulation:
+    """Return another controller in the loop of a run, with its steps, for as long."""
+    return simulate(
+        settings,
+        run.process,
+        scan,
+        setpoint=run.setpoint_step or 0.0,
+        load=run.load_step or 0.0,
+        time=float(run.times[-1]),
+        output_limits=run.limits,
+        initial=run.initial,
+        engine=forced,
+    )
+
+
+def _name(settings: Settings) -> str:
+    given_dials = ", ".join(f"{name} {number(value.value)}" for name, value in settings.items() if value.given and value.active)
+    return f"{settings.card.id}: {given_dials}" if given_dials else settings.card.id
 
 
 def _step(step: Step | None) -> str:

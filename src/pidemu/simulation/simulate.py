@@ -44,6 +44,8 @@ class Simulation:
         When and how far setpoint and load stepped [s, %].
     engine : Choice
         Which back end ran it, and why.
+    initial : tuple of float
+        Setpoint, measurement and output before [%].
     """
 
     settings: Settings
@@ -58,6 +60,7 @@ class Simulation:
     setpoint_step: Step | None
     load_step: Step | None
     engine: Choice
+    initial: tuple[float, float, float] = (50.0, 50.0, 50.0)
 
     @property
     def error(self) -> Floats:
@@ -148,10 +151,15 @@ def simulate(
         output_limits=output_limits,
         initial=initial,
     )
+    return ran(made, forced)
+
+
+def ran(made: Trial, forced: Engine | None = None) -> Simulation:
+    """Return a trial with the signals that it made; arguments as of `run_trial`."""
     pv, out, choice = run_trial(made, forced)
     return Simulation(
-        settings, process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
-        made.load_step, choice,
+        made.settings, made.process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
+        made.load_step, choice, made.initial,
     )  # fmt: skip
 
 
