@@ -66,7 +66,7 @@ Margins, sampled and within the limits
 
 
 def figure(out: str, name: str) -> float:
-    (line,) = [line for line in out.splitlines() if line.strip().startswith(name)]
+    line = next(line for line in out.splitlines() if line.strip().startswith(name))  # of the whole run, before each response
     return float(line.strip().removeprefix(name).split()[0])
 
 
