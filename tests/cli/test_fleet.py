@@ -393,10 +393,11 @@ OVERLAPPING = {
     ),
     "--parquet s/o.pq --signals s": "--parquet s/o.pq lies in --signals s, where nothing else may be written; give another place",
     "--parquet o.pq --signals o.pq.parts": (
-        "--signals o.pq.parts and the parts of --parquet o.pq are the same; give each its own name"
+        "--signals o.pq.parts and the parts of --parquet in o.pq.parts are the same; give each its own name"
     ),
     "--parquet o.pq --table o.pq.parts/o.csv": (
-        "--table o.pq.parts/o.csv lies in the parts of --parquet o.pq, where nothing else may be written; give another place"
+        "--table o.pq.parts/o.csv lies in the parts of --parquet in o.pq.parts, where nothing else may be written; "
+        "give another place"
     ),
 }
 
