@@ -445,3 +445,13 @@ def test_rows_that_make_no_loop_are_told_though_the_others_cannot_be_run(folder:
     assert status == 2
     assert err.splitlines()[0] == f"loops.csv:3: LIC-3: {WHY}"
     assert err.splitlines()[1].startswith("error: ")
+
+
+def test_a_row_says_where_its_scan_interval_is_longer_than_it_would_take(folder: Path) -> None:
+    (folder / "quick.csv").write_text(
+        'tag,card,settings,process,time\nFIC-1,generic/standard,K=2; Ti=10,"gain=1,lag=0.0001,delay=0.000001",3\n', encoding="utf-8"
+    )
+    found = said("fleet", "quick.csv", "--table", "out.csv")
+    assert found.status == 0
+    assert "quick.csv:2: FIC-1: a scan interval of 3e-05 s is taken, since with the " in found.err
+    assert "a scan interval of 3e-05 s is taken" in (folder / "out.csv").read_text(encoding="utf-8")

@@ -138,6 +138,8 @@ def command(
 
 def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool | None) -> Iterator[str]:
     """Yield what should be known beside the figures."""
+    if made.note:
+        yield made.note
     if action == "direct" and made.settings.equation.action.fixed:
         yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
     if margins is None:

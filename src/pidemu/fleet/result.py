@@ -58,7 +58,7 @@ class FleetResult:
         ``"done"``; ``"unstable"``: it ran, and the loop is unstable; ``"ran away"``: it ran, and the measurement outgrew all
         numbers; ``"failed"``: it could not be run; ``"not run"``: the run was interrupted before.
     reasons : list of str
-        Why a loop failed.
+        Why a loop failed, or has a longer scan interval than it would take.
     columns : dict of str to ndarray, shape (loops,)
         ``iae`` [% s], ``peak`` [%], ``travel`` [%], ``at_low``, ``at_high`` [s], ``swing``, what the error moves over in the last
         fifth of the run [%], and the last ``error`` [%]; ``gain_margin``, ``phase_margin`` [deg] and ``Ms`` of the sampled loop
@@ -105,6 +105,7 @@ class FleetResult:
             place = member.place
             self._take(place, judgement(found, i))
             self.scan[place], self.scans[place] = member.trial.scan, member.trial.scans
+            self.reasons[place] = member.trial.note
             self.engines[place] = found.engine.engine
             kept = found.records if found.file is None else found.file
             if kept is not None:

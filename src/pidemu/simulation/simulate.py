@@ -44,6 +44,8 @@ class Simulation:
         When and how far setpoint and load stepped [s, %].
     engine : Choice
         Which back end ran it, and why.
+    note : str
+        Why the scan interval is longer than the loop would take; empty where it is not.
     """
 
     settings: Settings
@@ -58,6 +60,7 @@ class Simulation:
     setpoint_step: Step | None
     load_step: Step | None
     engine: Choice
+    note: str = ""
 
     @property
     def error(self) -> Floats:
@@ -97,7 +100,7 @@ def simulate(
         The process, from output [%] to measurement [%].
     scan : float, optional
         Scan interval [s]; by default the card's, or a twentieth of the time in which the loop moves (the reciprocal of its gain
-        crossover frequency) where that is shorter.
+        crossover frequency) where that is shorter; not so short that the run has more than 100,000 scans.
     setpoint, load : float or tuple of float
         Size of a setpoint step, and of a load step that adds to the controller's output at the process [%]; or when [s] and size.
         By default after a twentieth of the time, and after half of it. They count from the first scan at or after that time; a size
@@ -151,7 +154,7 @@ def simulate(
     pv, out, choice = run_trial(made, forced)
     return Simulation(
         settings, process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
-        made.load_step, choice,
+        made.load_step, choice, made.note,
     )  # fmt: skip
 
 
