@@ -393,10 +393,11 @@ OVERLAPPING = {
     ),
     "--parquet s/o.pq --signals s": "--parquet s/o.pq lies in --signals s, where nothing else may be written; give another place",
     "--parquet o.pq --signals o.pq.parts": (
-        "--signals o.pq.parts and the parts of --parquet o.pq are the same; give each its own name"
+        "--signals o.pq.parts and the parts of --parquet in o.pq.parts are the same; give each its own name"
     ),
     "--parquet o.pq --table o.pq.parts/o.csv": (
-        "--table o.pq.parts/o.csv lies in the parts of --parquet o.pq, where nothing else may be written; give another place"
+        "--table o.pq.parts/o.csv lies in the parts of --parquet in o.pq.parts, where nothing else may be written; "
+        "give another place"
     ),
 }
 
@@ -444,3 +445,13 @@ def test_rows_that_make_no_loop_are_told_though_the_others_cannot_be_run(folder:
     assert status == 2
     assert err.splitlines()[0] == f"loops.csv:3: LIC-3: {WHY}"
     assert err.splitlines()[1].startswith("error: ")
+
+
+def test_a_row_says_where_its_scan_interval_is_longer_than_it_would_take(folder: Path) -> None:
+    (folder / "quick.csv").write_text(
+        'tag,card,settings,process,time\nFIC-1,generic/standard,K=2; Ti=10,"gain=1,lag=0.0001,delay=0.000001",3\n', encoding="utf-8"
+    )
+    found = said("fleet", "quick.csv", "--table", "out.csv")
+    assert found.status == 0
+    assert "quick.csv:2: FIC-1: a scan interval of 3e-05 s is taken, since with the " in found.err
+    assert "a scan interval of 3e-05 s is taken" in (folder / "out.csv").read_text(encoding="utf-8")

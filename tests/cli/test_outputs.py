@@ -63,6 +63,54 @@ def test_an_empty_name_is_refused_and_nothing_is_written(words: tuple[str, ...],
     assert everything(folder.parent) == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        (*RUN, "--output", "a\0"),
+        (*RUN, "--plot", "a\0.png"),
+        (*COMPARE, "--output", "a\0"),
+        (*SIMULATE, "--out", "a\0"),
+        (*CONVERT, "--html", "a\0"),
+        (*MATRIX, "--csv", "a\0"),
+        ("fleet", "f.csv", "--table", "a\0"),
+        ("fleet", "f.csv", "--parquet", "a\0"),
+        ("fleet", "f.csv", "--signals", "a\0"),
+        ("code", *PROVOX, "--out", "a\0"),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused_before_anything_is_written(words: tuple[str, ...], folder: Path) -> None:
+    before = everything(folder.parent)
+    status, out, err = said(*words)
+    name = "a\\x00" + {"--plot": ".png", "--out": "/fisher_provox.py" if "code" in words else ""}.get(words[-2], "")
+    expected = f"error: {name}: cannot be written: no file can have this name\n"
+    assert (status, out, err) == (2, "", expected)
+    assert everything(folder.parent) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", *PROVOX, "--record", "a\0"),
+        ("run", *PROVOX, "--record", "rr.csv", "--vendors", "a\0"),
+        ("compare", *PROVOX, *PROVOX, "--record", "a\0"),
+        ("convert", *PROVOX, "--to", "a\0"),
+        ("convert", "--loop", "a\0", "--to", "emerson/deltav"),
+        ("fleet", "a\0"),
+        ("check", "a\0"),
+        ("show", "a\0.yaml"),
+        ("fit", "a\0"),
+        ("certificate", "a\0"),
+        ("verify", "a\0"),
+    ],
+)
+def test_a_name_with_nul_of_what_is_read_is_refused_in_words(words: tuple[str, ...]) -> None:
+    status, out, err = said(*words)
+    assert (status, out) == (2, "")
+    assert "Traceback" not in err
+    assert "\0" not in err
+    assert "rror" in err
+
+
 V = ("--vendors", "v")
 CARD = "v/fisher/provox.yaml"
 
@@ -115,6 +163,7 @@ def test_two_results_do_not_go_to_one_file(words: tuple[str, ...], options: str,
     if there:
         (folder / words[-3]).write_text("old", encoding="utf-8")
     before = everything(folder)
-    message = f"error: {words[-1]}: is given for two results, {options}; give each a file of its own\n"
+    one, other = options.split(" and ")
+    message = f"error: {one} {words[-3]} and {other} {words[-1]} are the same; give each its own name\n"
     assert said(*words) == (2, "", message)
     assert everything(folder) == before

@@ -261,3 +261,9 @@ def test_what_was_not_stated_is_said_with_what_was_taken() -> None:
 def test_a_scan_interval_that_is_none_is_refused(scan: float) -> None:
     with pytest.raises(ScanError, match="is not a positive number"):
         explained("fisher/provox", scan, GAIN=2, RESET=4)
+
+
+@pytest.mark.parametrize("scan", [5e-324, 1e300])
+def test_a_scan_interval_that_no_controller_has_is_refused(scan: float) -> None:
+    with pytest.raises(ScanError, match="is not an interval at which a controller is executed"):
+        explained("fisher/provox", scan, GAIN=2, RESET=4)

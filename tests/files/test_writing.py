@@ -110,6 +110,51 @@ with beside({str(tmp_path / "a.csv")!r}, RecordError) as stream:
     (rest,) = (path for path in tmp_path.iterdir() if path.name != "a.csv")
     assert rest.name.startswith(".a.csv.")
     assert rest.name.endswith(".unfinished")
+    write(tmp_path / "b.csv", "another")
+    assert rest.exists()
+    write(tmp_path / "a.csv", "new")
+    assert names(tmp_path) == ["a.csv", "b.csv"]
+    assert (tmp_path / "a.csv").read_text() == "new"
+
+
+def test_a_file_that_another_is_writing_is_not_taken_for_a_leftover(tmp_path: Path) -> None:
+    with beside(tmp_path / "a.csv", RecordError) as first:
+        first.write("first")
+        check(tmp_path / "a.csv", RecordError)
+        write(tmp_path / "a.csv", "second")
+        assert (tmp_path / "a.csv").read_text() == "second"
+    assert (tmp_path / "a.csv").read_text() == "first"
+    assert names(tmp_path) == ["a.csv"]
+
+
+@POSIX
+def test_what_only_looks_like_a_leftover_stays(tmp_path: Path) -> None:
+    (tmp_path / ".a.csv.0123abcd.unfinished").symlink_to(tmp_path / "elsewhere")
+    os.mkfifo(tmp_path / ".a.csv.0123abce.unfinished")
+    (tmp_path / ".a.csv.mine.unfinished").write_text("mine")
+    there = names(tmp_path)
+    write(tmp_path / "a.csv", "new")
+    assert names(tmp_path) == [*there, "a.csv"]
+
+
+def test_a_folder_in_which_no_file_can_be_made_is_said_where_the_file_itself_could_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "a.csv", "old")
+    opens = os.open
+
+    def refusing(path: str, flags: int, mode: int = 0o777) -> int:
+        if str(path).endswith(".unfinished"):
+            raise PermissionError(13, "Permission denied")
+        return opens(path, flags, mode)
+
+    monkeypatch.setattr(os, "open", refusing)
+    assert message(tmp_path / "a.csv") == (
+        f"{tmp_path / 'a.csv'}: cannot be written: no file can be made in its folder, and a new one is made there before it takes "
+        "the place of the old one; give a file in another folder"
+    )
+    assert message(tmp_path / "b.csv") == f"{tmp_path / 'b.csv'}: cannot be written: Permission denied"
+    assert (tmp_path / "a.csv").read_text() == "old"
 
 
 def test_a_file_that_is_read_is_not_written_by_whatever_name(tmp_path: Path) -> None:

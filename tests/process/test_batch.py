@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pidemu
+from pidemu.analysis.frequency import loop_response
 from pidemu.errors import ProcessError
 from pidemu.process.process import Process, parse_process
 from pidemu.process.reduction import half_rule
@@ -113,10 +114,15 @@ def test_a_gain_in_engineering_units_becomes_one_in_percent_with_the_ranges() ->
 
 def test_a_loop_refuses_a_gain_that_is_not_in_percent() -> None:
     settings = pidemu.load_card("generic/standard").settings(K=1, Ti=10)
-    with refused(
-        "the gain of 2/(10 s + 1) [degC/%] is in degC/%, and a loop is computed in %/%; give process.in_percent(pv_range)"
-    ):
+    message = "the gain of 2/(10 s + 1) [degC/%] is in degC/%, and a loop is computed in %/%; give process.in_percent(pv_range)"
+    with refused(message):
         pidemu.simulate(settings, Process(2, [-0.1], unit="degC/%"), scan=1)
+    with refused(message):
+        pidemu.convert(settings, "emerson/deltav", process=Process(2, [-0.1], unit="degC/%"))
+    with refused(message):
+        pidemu.robustness(settings, Process(2, [-0.1], unit="degC/%"))
+    with refused(message):
+        loop_response(settings, Process(2, [-0.1], unit="degC/%"))
     with refused("gain=2 degC/%: a process gain is in %/% of the signal ranges; convert it and leave out the unit"):
         parse_process("gain=2 degC/%,lag=10")
 

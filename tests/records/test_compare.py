@@ -328,13 +328,29 @@ def test_everything_is_there_as_plain_values() -> None:
         ([], None, "a comparison needs two controllers or more, 0 given"),
         ([pi()], None, "a comparison needs two controllers or more, 1 given"),
         ([pi(), pi()], (1.0, 2.0, 3.0), "3 scan intervals for 2 controllers; give one for all, or one for each"),
-        ([pi(), pi()], 0.0, "scan interval 0 of the standard record is not a positive number"),
+        ([pi(), pi()], 0.0, "scan interval 0 s is not a positive number"),
+        (
+            [pi(), pi()],
+            8e-27,
+            "scan interval: 8e-27 s is not an interval at which a controller is executed, 1e-09 to 1e+09 s in size; "
+            "check the number and its unit",
+        ),
     ],
 )
 def test_what_cannot_be_compared_is_refused(settings: list[Settings], scan: float | tuple[float, ...] | None, message: str) -> None:
     with pytest.raises(ScanError) as caught:
         pidemu.compare(settings, scan=scan)
     assert str(caught.value) == message
+
+
+def test_an_interval_at_which_a_record_would_have_too_many_samples_is_refused() -> None:
+    record = Record(of(50), of(50))
+    with pytest.raises(RecordError) as caught:
+        pidemu.compare([pi(), pi()], record, scan=(1.0, 1e-9))
+    assert str(caught.value) == (
+        f"record: read every 1e-09 s, its {record.sp.size} s are {record.sp.size * 1e9:.3g} samples, more than 10,000,000; "
+        "give a longer scan interval"
+    )
 
 
 def test_limits_that_are_no_range_are_refused() -> None:

@@ -197,3 +197,14 @@ def test_a_first_line_that_the_header_contradicts_is_the_cause(text: str, says: 
     cause = f"the file says that {says} separates its cells \\(sep=\\), but its header is separated by {has}; remove that line"
     with pytest.raises(RecordError, match=rf":2: {cause}$"):
         read(tmp_path, text)
+
+
+@pytest.mark.parametrize("name", ["time", "interval"])
+@pytest.mark.parametrize("time", ["1.7976931348623157e308", "-1e300", "1e-300"])
+def test_a_time_that_no_loop_has_is_refused_with_its_place(tmp_path: Path, name: str, time: str) -> None:
+    with pytest.raises(RecordError) as caught:
+        read(tmp_path, f"sp,pv,{name}\n1,2,0\n1,2,{time}\n")
+    assert str(caught.value) == (
+        f"{tmp_path / 'record.csv'}:3: column {name}: {float(time):g} s is not a time that a loop has, 1e-30 to 1e+15 s in size; "
+        "check the number and its unit"
+    )

@@ -200,3 +200,9 @@ def test_states_are_set_before_the_first_scan() -> None:
     ctl.reset()
     ctl.start(I=3.0)
     assert ctl.scan(sp=50.0, pv=50.0) == 3
+
+
+def test_times_that_no_loop_has_are_refused_from_python_too() -> None:
+    record = Record(np.array([50.0, 50.0]), np.array([50.0, 50.0]), time=np.array([0.0, 1.7e308]))
+    with pytest.raises(RecordError, match=r"^time column: 1\.7e\+308 s is not a time that a loop has"):
+        even_step(record)

@@ -205,6 +205,21 @@ def test_by_default_the_scan_is_the_cards_and_short_enough_and_both_responses_se
     assert slow.scan == 1.0
 
 
+def test_a_scan_interval_that_nobody_asked_for_costs_no_more_than_100_000_scans() -> None:
+    s, quick = parallel(kp=2, ki=0.2), Process.from_lags(1, [1e-4], delay=1e-6)
+    found = simulate(s, quick, time=3)
+    assert (found.scan, found.times.size) == (3e-5, 100_001)
+    assert scan_for(s, quick) == 2.8e-06
+    assert found.note == (
+        "a scan interval of 3e-05 s is taken, since with the 2.8e-06 s that suit this loop the run would have more than 100,000 "
+        "scans; give the interval, or a shorter time"
+    )
+    assert simulate(s, quick, 1e-5, time=2).scan == 1e-5
+    assert simulate(s, quick, 1e-5, time=2).note == ""
+    assert simulate(s, quick, time=150_000, engine="python").scan == 1.0  # the card's own
+    assert simulate(s, quick).note == ""
+
+
 def test_the_iae_of_straight_lines_through_zero_is_exact() -> None:
     zero: Floats = np.zeros(3)
     times: Floats = np.array([0.0, 2.0, 4.0])

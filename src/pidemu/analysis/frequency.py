@@ -105,9 +105,11 @@ def loop_response(
     Raises
     ------
     ProcessError
-        The range of frequencies is not one, or the sign of the gain is the action and the wrong one.
+        The range of frequencies is not one, or the sign of the gain is the action and the wrong one, or the
+        process has its gain in other units than %/%.
     """
     law = settings.law(scan)
+    process.check_percent()
     refuse_positive_feedback(settings, process)
     figures, loop = loop_figures(law, process), OpenLoop(law, process)
     middle = figures.crossover if math.isfinite(figures.crossover) else 1 / (process.time or 1.0)

@@ -107,7 +107,8 @@ def robustness(settings: Settings, process: Process, scan: float | None = None) 
     Raises
     ------
     ProcessError
-        The sign of the gain is the action, and the wrong one for the process; or the process cannot be sampled so.
+        The sign of the gain is the action, and the wrong one for the process; or the process cannot be sampled so, or has its
+        gain in other units than %/%.
     ScanError
         The scan interval cannot be used.
     UndefinedError
@@ -122,6 +123,7 @@ def robustness(settings: Settings, process: Process, scan: float | None = None) 
     (3.1416, 10.708, 1.59)
     """
     law = settings.law(scan)
+    process.check_percent()
     refuse_positive_feedback(settings, process)
     figures, loop = loop_figures(law, process), OpenLoop(law, process)
     if not loop.gain:

@@ -11,7 +11,7 @@ import click
 from pidemu.card.library import load_card
 from pidemu.certificate.unverified import facts, unverified_program
 from pidemu.cli.common import OutputArgument, action_option, assignments, echo, limits_option, vendors_option
-from pidemu.cli.outputs import inputs
+from pidemu.cli.inputs import inputs
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible

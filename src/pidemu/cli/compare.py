@@ -24,8 +24,9 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.events import moved
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.errors import RecordError
+from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.records.compare import Comparison, compare

@@ -25,13 +25,14 @@ from pidemu.cli.common import (
     split_options,
     vendors_option,
 )
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.cli.questions import print_questions
 from pidemu.conversion.convert import convert
 from pidemu.conversion.match_method import read_aim
 from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import ActionError, PidemuError, SettingError
+from pidemu.files.outputs import check_outputs
 from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings
 

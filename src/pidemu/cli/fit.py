@@ -9,9 +9,10 @@ import numpy as np
 
 from pidemu.arrays import Floats
 from pidemu.cli.common import OutputArgument, RangeArgument, TimeArgument, echo, heading, json_option, number, print_json, table
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.errors import FitRefusedError, RecordError
 from pidemu.excerpt import visible
+from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import counted
 from pidemu.process.document import plain_process
 from pidemu.process.fit.document import plain_refusal

@@ -28,15 +28,16 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
-from pidemu.cli.outputs import inputs
+from pidemu.cli.inputs import inputs
 from pidemu.errors import FleetError
 from pidemu.excerpt import quoted
+from pidemu.files.outputs import refuse_overlap
 from pidemu.files.writing import check
 from pidemu.fleet.fleet import Fleet
 from pidemu.fleet.judgement import MARGINS, RAN
 from pidemu.fleet.result import FleetResult
 from pidemu.fleet.table import LoopTable, read_loops
-from pidemu.fleet.writing import instead_of, refuse_overlap
+from pidemu.fleet.writing import instead_of, with_parts
 from pidemu.formatting import json_safe
 
 _ROWS: Final = 20
@@ -112,7 +113,7 @@ def command(
     loops = read_loops(file, vendors)
     if loops.skipped:
         echo(f"note: {file}: {loops.skipped}", err=True)
-    refuse_overlap({"--table": target, "--signals": signals, "--parquet": parquet})
+    refuse_overlap(with_parts({"--table": target, "--signals": signals, "--parquet": parquet}), FleetError)
     partly: dict[str, Path] = {}  # where what an interrupted run has done goes
     for path in (target, parquet):
         if path is not None:  # now, and not after the work

@@ -8,8 +8,9 @@ import click
 
 from pidemu.card.library import load_card
 from pidemu.cli.common import OutputArgument, RangeArgument, TimeArgument, assignments, given
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.errors import PidemuError
+from pidemu.files.outputs import check_outputs
 from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings
 

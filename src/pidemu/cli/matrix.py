@@ -12,8 +12,8 @@ import click
 
 from pidemu.card.library import card_files
 from pidemu.cli.common import OutputArgument, echo, heading, json_option, print_json, table, vendors_option, wrapped
-from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
+from pidemu.files.outputs import check_outputs
 from pidemu.files.writing import beside
 from pidemu.matrix.cell import OUTCOMES, Cell
 from pidemu.matrix.matrix import Matrix, counts, matrix

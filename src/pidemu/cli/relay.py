@@ -18,8 +18,8 @@ from pidemu.cli.common import (
     print_json,
     table,
 )
-from pidemu.cli.outputs import check_outputs
 from pidemu.errors import PidemuError
+from pidemu.files.outputs import check_outputs
 from pidemu.process.process import parse_process
 from pidemu.process.relay import RelayTest, relay_test
 from pidemu.process.text import written

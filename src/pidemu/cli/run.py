@@ -27,10 +27,11 @@ from pidemu.cli.common import (
     vendors_option,
 )
 from pidemu.cli.events import tell
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.controller.controller import Controller
 from pidemu.errors import RecordError, SettingError, suggest
 from pidemu.excerpt import printable
+from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.formatting import json_safe

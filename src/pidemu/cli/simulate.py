@@ -32,10 +32,11 @@ from pidemu.cli.common import (
     table,
     vendors_option,
 )
+from pidemu.cli.inputs import inputs
 from pidemu.cli.loop import check_plot, plot_option
-from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.errors import RecordError, SettingError
 from pidemu.excerpt import quoted
+from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
 from pidemu.fleet.blocks import COLUMNS, figures_of
@@ -179,6 +180,8 @@ def command(
 
 def _notes(made: Trial, action: Action | None, margins: LoopFigures | None, settled: bool | None) -> Iterator[str]:
     """Yield what should be known beside the figures."""
+    if made.note:
+        yield made.note
     if action == "direct" and made.settings.equation.action.fixed:
         yield f"{made.settings.card.id} has no choice of action: the sign of the gain decides"
     if margins is None:

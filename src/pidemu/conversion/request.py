@@ -180,6 +180,8 @@ def read_request(
         A name comes twice, or a range, mode, action or number of digits cannot be read.
     ScanError
         A scan interval is not a positive number.
+    ProcessError
+        The process has its gain in other units than %/%.
     """
     named: dict[str, object] = {}
     for name, value in [*(options or {}).items(), *(given or {}).items()]:
@@ -193,6 +195,8 @@ def read_request(
     real, pace = _intervals_of(scan, runs_every)
     if compensate and real is None:
         raise SettingError("compensate makes up for the scan intervals, which were not given; add --scan (scan= from Python)")
+    if process is not None:
+        process.check_percent()
     return Request(
         options=chosen,
         given=dials,

@@ -16,6 +16,7 @@ from pidemu.explanation.forms import Forms, Times, forms_of
 from pidemu.explanation.model import Explanation, FilterFacts, Mode
 from pidemu.explanation.responses import ramp_of, responses_of
 from pidemu.explanation.words import action_sentence, summary_of
+from pidemu.plausible import INTERVAL, plausible
 from pidemu.settings.settings import Settings
 
 
@@ -54,6 +55,7 @@ def explain(settings: Settings, scan: float | None = None) -> Explanation:
     """
     if scan is not None and not 0 < scan < float("inf"):
         raise ScanError(f"scan interval {scan:g} s is not a positive number")
+    scan = None if scan is None else plausible("scan interval", scan, INTERVAL, ScanError)
     a = settings.algorithm(scan=scan).linear
     dahlin = a.dahlin is not None
     h = default_scan(settings.equation) if dahlin and scan is None else scan

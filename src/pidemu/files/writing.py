@@ -15,13 +15,16 @@ from typing import IO, Any, BinaryIO, Final, Literal, NoReturn, TextIO, overload
 
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
-from pidemu.files.reading import is_folder, reason
+from pidemu.files.leftovers import UNFINISHED, is_own, remove_leftovers
+from pidemu.files.reading import is_file, is_folder, reason
 
 _FULL: Final = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG")} - {None}
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-UNFINISHED: Final = ".unfinished"
-"""Ending of a file that is being written beside another."""
 _NO_READER: Final = "nothing reads this pipe; start the reader first, such as 'cat {} > FILE &', or give a file"
+_NO_ROOM: Final = (
+    "no file can be made in its folder, and a new one is made there before it takes the place of the old one; "
+    "give a file in another folder"
+)
 _PIPES: Final[dict[tuple[int, int], int]] = {}
 """Pipes that were looked at, open since then: to its reader, one that is closed again has ended."""
 
@@ -44,7 +47,8 @@ def beside(
     """Open a file to write; it takes the place of `path` when all is written, and else nothing has happened.
 
     The new file is written in the folder of the old one, flushed to the disk, gets the old one's mode, and is renamed. Of a link
-    it is the target that is replaced. What is not a regular file, such as a pipe or ``/dev/stdout``, is written straight.
+    it is the target that is replaced. What is not a regular file, such as a pipe or ``/dev/stdout``, is written straight. What a
+    killed process left beside is removed.
 
     Parameters
     ----------
@@ -82,9 +86,9 @@ def check(path: str | Path, error: type[PidemuError], inputs: Iterable[str | Pat
     with _told(name, error):
         target = _target(path, name, error, tuple(inputs))
         if target is not None:
-            number, unfinished = _unfinished(target)
+            number, unfinished = _unfinished(target, name, error)
             os.close(number)
-            unfinished.unlink()
+            unfinished.unlink(missing_ok=True)
             return
         found = os.stat(path)
         if stat.S_ISFIFO(found.st_mode) and _standard(found) is None:
@@ -111,7 +115,8 @@ def _beside(path: str | Path, error: type[PidemuError], inputs: tuple[str | Path
             with _stream(_straight(path), binary) as stream:
                 yield stream
             return
-        number, unfinished = _unfinished(target)
+        number, unfinished = _unfinished(target, name, error)
+        held = os.dup(number) if os.name == "posix" else None  # its lock, until it has its name
         try:
             with _stream(number, binary) as stream:
                 yield stream
@@ -121,11 +126,16 @@ def _beside(path: str | Path, error: type[PidemuError], inputs: tuple[str | Path
         except BaseException:
             with contextlib.suppress(OSError):
                 unfinished.unlink()
+            if held is not None:
+                os.close(held)
             raise
     try:
         os.replace(unfinished, target)
     except OSError as fault:  # the work is not lost: it is there under the other name
         raise error(f"{name}: cannot be replaced: {reason(fault)}; the result is in {visible(str(unfinished))}") from None
+    finally:
+        if held is not None:
+            os.close(held)
     _settle(target.parent)
 
 
@@ -213,11 +223,21 @@ def _close(found: os.stat_result) -> None:
         os.close(number)
 
 
-def _unfinished(target: Path) -> tuple[int, Path]:
+def _unfinished(target: Path, name: str, error: type[PidemuError]) -> tuple[int, Path]:
     """Make a new file beside the target, and return its number and name."""
     short = target.name.encode(errors="surrogateescape")[:80].decode(errors="ignore")
-    unfinished = target.with_name(f".{short}.{secrets.token_hex(4)}{UNFINISHED}")
-    return os.open(unfinished, _FLAGS, 0o666), unfinished
+    remove_leftovers(target.parent, short)
+    while True:
+        unfinished = target.with_name(f".{short}.{secrets.token_hex(4)}{UNFINISHED}")
+        try:
+            number = os.open(unfinished, _FLAGS, 0o666)
+        except PermissionError:
+            if is_file(target):  # which can be written itself
+                raise error(f"{name}: cannot be written: {_NO_ROOM}") from None
+            raise
+        if is_own(number):
+            return number, unfinished
+        os.close(number)
 
 
 @contextlib.contextmanager

@@ -67,6 +67,8 @@ class Group:
         From a place to the trial of its loop.
     judged : tuple or None
         Margins of each, and whether it is stable; where there are neither, ``None``.
+    notes : tuple of str or None
+        Why a scan interval is longer than a loop would take; ``None`` where none is.
     """
 
     structure: Structure
@@ -76,6 +78,7 @@ class Group:
     columns: PreparedColumns
     trial: Callable[[int], Trial]
     judged: tuple[tuple[LoopFigures | None, bool | None], ...] | None = None
+    notes: tuple[str, ...] | None = None
 
     def __len__(self) -> int:
         return len(self.tags)
@@ -107,6 +110,7 @@ class Group:
             self.columns.chosen(at),
             self.trial,
             judged,
+            None if self.notes is None else _some(self.notes, which),
         )
 
     def light(self) -> Group:
@@ -155,6 +159,7 @@ def _joined(groups: Sequence[Group]) -> Group:
     judged = None
     if any(g.judged is not None for g in groups):
         judged = _all(g.judged or ((None, None),) * len(g) for g in groups)
+    notes = _all(g.notes or ("",) * len(g) for g in groups) if any(g.notes is not None for g in groups) else None
     return Group(
         groups[0].structure,
         np.concatenate([g.places for g in groups]),
@@ -163,6 +168,7 @@ def _joined(groups: Sequence[Group]) -> Group:
         PreparedColumns.joined([g.columns for g in groups]),
         groups[0].trial,
         judged,
+        notes,
     )
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pidemu.errors import FleetError
+from pidemu.files.leftovers import UNFINISHED
 from pidemu.files.reading import is_file
-from pidemu.files.writing import UNFINISHED, beside, check
+from pidemu.files.writing import beside, check
 from pidemu.fleet.blocks import COLUMNS, BlockOutcome
 from pidemu.fleet.finished import FIELDS, Finished, read_row
 from pidemu.fleet.judgement import MARGINS

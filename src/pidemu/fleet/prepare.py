@@ -116,7 +116,8 @@ class Preparation:
         numbers = (program.values, program.initial, program.lengths, trial.scan, trial.scans, last_answer(trial))
         columns = PreparedColumns(*(np.array([x], dtype=np.float64) for x in numbers))
         trial_at, card = partial(_trial, self._plan, loops), loop.settings.card.id
-        return Group(shared, np.array([place]), (loop.tag,), (card,), columns, trial_at, ((margins, stable),))
+        notes = (trial.note,) if trial.note else None
+        return Group(shared, np.array([place]), (loop.tag,), (card,), columns, trial_at, ((margins, stable),), notes)
 
 
 def _trial(plan: FleetPlan, loops: PlacedLoops, place: int) -> Trial:

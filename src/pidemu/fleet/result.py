@@ -59,7 +59,7 @@ class FleetResult:
         ``"done"``; ``"unstable"``: it ran, and the loop is unstable; ``"ran away"``: it ran, and the measurement outgrew all
         numbers; ``"failed"``: it could not be run; ``"not run"``: the run was interrupted before.
     reasons : list of str
-        Why a loop failed.
+        Why a loop failed, or has a longer scan interval than it would take.
     columns : dict of str to ndarray, shape (loops,)
         ``iae`` [% s], ``peak`` [%], ``travel`` [%], ``at_low``, ``at_high`` [s], ``swing``, what the error moves over in the last
         fifth of the run [%], and the last ``error`` [%]; ``gain_margin``, ``phase_margin`` [deg] and ``Ms`` of the sampled loop
@@ -107,6 +107,7 @@ class FleetResult:
         for i, (member, judged) in enumerate(judgements(found)):
             self._take(member.place, judged)
             self.engines[member.place] = found.engine.engine
+            self.reasons[member.place] = found.members.notes[i] if found.members.notes is not None else ""
             if kept is not None:
                 self._signals[member.place] = (kept, i)
         return len(places)

@@ -14,11 +14,12 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
+from pidemu.files.outputs import refuse_overlap
 from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import Finished, finished
 from pidemu.fleet.folder import Place, SignalFolder
 from pidemu.fleet.parquet import ParquetFile
-from pidemu.fleet.writing import End, refuse_overlap
+from pidemu.fleet.writing import End, with_parts
 
 _FAULTS: Final = 5
 """Damaged files that are named; there may be thousands."""
@@ -52,7 +53,7 @@ class SignalStore:
                 "there is nothing to go on with: what is done is kept where signals go to files; "
                 "give the folder (--signals, folder=) or the Parquet file (--parquet, parquet=) of the run that did not end"
             )
-        refuse_overlap({"folder": folder, "parquet": parquet})
+        refuse_overlap(with_parts({"folder": folder, "parquet": parquet}), FleetError)
         self._keep = keep
         self._folder = None if folder is None else SignalFolder(Path(folder), resume)
         self._parquet = None if parquet is None else ParquetFile(Path(parquet), resume)

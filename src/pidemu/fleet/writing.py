@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Literal
 
 from pidemu.errors import FleetError
-from pidemu.excerpt import visible
+from pidemu.files.outputs import Outputs
 from pidemu.files.writing import is_replaced
 
 End = Literal["finished", "interrupted", "failed"]
@@ -42,30 +41,13 @@ def instead_of(path: str | Path) -> Path:
     return interrupted_name(path) if is_replaced(path) else Path(path)
 
 
-def refuse_overlap(outputs: Mapping[str, str | Path | None]) -> None:
-    """Refuse files and folders that are the same or inside each other: one would be lost.
+def with_parts(outputs: Outputs) -> Outputs:
+    """Return what a fleet writes together with the folder in which a Parquet file grows.
 
     Parameters
     ----------
     outputs : mapping of str to path or None
         What is written, by what the user calls it; a Parquet file's name holds ``parquet``.
-
-    Raises
-    ------
-    FleetError
-        Two of them overlap.
     """
-    places = [(f"{name} {visible(str(path))}", _real(path)) for name, path in outputs.items() if path is not None]
-    parts = [
-        (f"the parts of {n} {visible(str(p))}", _real(f"{p}.parts")) for n, p in outputs.items() if p is not None and "parquet" in n
-    ]
-    for (one, first), (other, second) in itertools.combinations([*places, *parts], 2):
-        if first == second:
-            raise FleetError(f"{one} and {other} are the same; give each its own name")
-        for (inner, inside), (outer, outside) in (((one, first), (other, second)), ((other, second), (one, first))):
-            if outside in inside.parents:
-                raise FleetError(f"{inner} lies in {outer}, where nothing else may be written; give another place")
-
-
-def _real(path: str | Path) -> Path:
-    return Path(os.path.normcase(os.path.realpath(path)))
+    parts = {f"the parts of {name} in": f"{path}.parts" for name, path in outputs.items() if path is not None and "parquet" in name}
+    return {**outputs, **parts}

@@ -13,6 +13,7 @@ from pidemu.card.model.card_file import default_scan
 from pidemu.controller.bench import limits_in_percent
 from pidemu.errors import ScanError
 from pidemu.formatting import json_safe
+from pidemu.plausible import INTERVAL, plausible
 from pidemu.records.files import Record, read_record
 from pidemu.records.playback import even_step
 from pidemu.records.sampling import mode_segments, record_in_percent
@@ -186,13 +187,16 @@ def compare(
 
 
 def _scans(given: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:
-    if given is None or isinstance(given, int | float):
-        return (given,) * count
-    if len(given) == 1:
-        return (given[0],) * count
-    if len(given) != count:
-        raise ScanError(f"{len(given)} scan intervals for {count} controllers; give one for all, or one for each")
-    return tuple(given)
+    if given is None:
+        return (None,) * count
+    several = (given,) if isinstance(given, int | float) else given
+    if len(several) not in (1, count):
+        raise ScanError(f"{len(several)} scan intervals for {count} controllers; give one for all, or one for each")
+    found = tuple(plausible("scan interval", h, INTERVAL, ScanError) for h in several)
+    wrong = next((h for h in found if h <= 0), None)
+    if wrong is not None:
+        raise ScanError(f"scan interval {wrong:g} s is not a positive number")
+    return found * count if len(found) == 1 else found
 
 
 def _start(out: SignalRange, record: Record, given: float | None) -> float:

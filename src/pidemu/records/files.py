@@ -18,7 +18,7 @@ from pidemu.excerpt import quoted, visible
 from pidemu.files.columns import AT_ONCE, RowsOfText, plain_numbers, rows_of, write_longer
 from pidemu.files.reading import Kind, read_text
 from pidemu.files.tables import counted, split_lines, split_row, write_rows
-from pidemu.plausible import plain_number
+from pidemu.plausible import TIME, plain_number
 
 _COLUMNS: Final = {
     "time": ("time", "t", "timestamp"),
@@ -264,6 +264,8 @@ def _cell(where: str, text: str, name: str) -> float:
         raise RecordError(f"{where}: {error}") from None
     if name == "interval" and math.isnan(value):
         raise RecordError(f"{where}: '{text}' is not an interval; leave the cell empty for the nominal one")
+    if name == "interval" and math.isfinite(value) and not TIME.has(value):
+        raise RecordError(f"{where}: {TIME.refusal(f'{value:g} s')}")
     if name in SIGNALS and math.isinf(value):
         raise RecordError(f"{where}: '{text}' is not a finite number; leave the cell empty where there is no signal")
     return value
@@ -281,7 +283,10 @@ def _yes_or_no(where: str, text: str, name: str) -> float:
 
 def _time(where: str, text: str) -> float | datetime:
     with contextlib.suppress(ValueError):
-        return plain_number(text)
+        time = plain_number(text)
+        if TIME.has(time):
+            return time
+        raise RecordError(f"{where}: {TIME.refusal(f'{time:g} s')}")
     try:
         stamp = datetime.fromisoformat(text)
     except ValueError:

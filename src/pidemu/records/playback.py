@@ -15,7 +15,7 @@ from pidemu.arrays import Flags, Floats
 from pidemu.controller.controller import Controller
 from pidemu.controller.signals import SIGNALS, Event
 from pidemu.errors import RecordError, ScanError
-from pidemu.plausible import SIGNAL
+from pidemu.plausible import SIGNAL, TIME
 from pidemu.records.files import Record
 from pidemu.settings.settings import Settings
 
@@ -162,7 +162,10 @@ def _steps(record: Record) -> tuple[Floats, str]:
         return record.interval, f"column {record.names.get('interval', 'interval')}"
     if record.time is None:
         return np.full(record.sp.size, math.nan), ""
-    digits = int(-math.log10(2 * np.spacing(max(1.0, float(np.abs(record.time).max())))))
+    furthest = float(np.abs(record.time).max())
+    if not TIME.has(furthest):
+        raise RecordError(f"time column: {TIME.refusal(f'{furthest:g} s')}")
+    digits = int(-math.log10(2 * np.spacing(max(1.0, furthest))))
     steps: Floats = np.round(np.diff(record.time, prepend=math.nan), digits)
     return steps, "time column"
 

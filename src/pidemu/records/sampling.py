@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from pidemu.records.standard import Segment, StandardRecord, standard_record
 from pidemu.settings.ranges import SignalRanges
 from pidemu.settings.settings import Settings
 
+MOST_SAMPLES: Final = 10_000_000
+"""Samples that a record can have at another interval than its own."""
 _LIKE_PV = ("sp", "pv", "cascade")
 _LIKE_OUTPUT = ("manual", "output", "track", "external_reset", "feedforward")
 
@@ -62,7 +64,8 @@ def sampled(record: Record, path: str | Path, scan: float | None, settings: Sett
     Raises
     ------
     RecordError
-        The record is uneven, no interval is given, and the card does not measure it; or its time goes back.
+        The record is uneven, no interval is given, and the card does not measure it; or its time goes back, or it has too many
+        samples at the interval.
     """
     if isinstance(record, StandardRecord):
         h = default if scan is None else scan
@@ -79,7 +82,13 @@ def sampled(record: Record, path: str | Path, scan: float | None, settings: Sett
     if not (np.isfinite(times).all() and (between > 0).all()):
         raise RecordError(f"{path}: its time does not increase from line to line, which it must to be read every {scan:g} s")
     end = times[-1] + (float(np.median(between)) if between.size else base)
-    grid = times[0] + np.arange(math.ceil((end - times[0]) / scan - 1e-6)) * scan
+    count = (end - times[0]) / scan
+    if count > MOST_SAMPLES:
+        raise RecordError(
+            f"{path}: read every {scan:g} s, its {end - times[0]:g} s are {count:.3g} samples, more than {MOST_SAMPLES:,}; "
+            f"give a longer scan interval"
+        )
+    grid = times[0] + np.arange(math.ceil(count - 1e-6)) * scan
     at = np.searchsorted(times, grid + 1e-6 * scan, side="right") - 1
     columns = ("sp", "pv", "auto", "manual", "output", "cascade", "track", "external_reset", "feedforward", "hold")
     given = {name: getattr(record, name) for name in columns}

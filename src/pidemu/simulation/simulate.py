@@ -46,6 +46,8 @@ class Simulation:
         Which back end ran it, and why.
     initial : tuple of float
         Setpoint, measurement and output before [%].
+    note : str
+        Why the scan interval is longer than the loop would take; empty where it is not.
     """
 
     settings: Settings
@@ -61,6 +63,7 @@ class Simulation:
     load_step: Step | None
     engine: Choice
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0)
+    note: str = ""
 
     @property
     def error(self) -> Floats:
@@ -100,7 +103,7 @@ def simulate(
         The process, from output [%] to measurement [%].
     scan : float, optional
         Scan interval [s]; by default the card's, or a twentieth of the time in which the loop moves (the reciprocal of its gain
-        crossover frequency) where that is shorter.
+        crossover frequency) where that is shorter; not so short that the run has more than 100,000 scans.
     setpoint, load : float or tuple of float
         Size of a setpoint step, and of a load step that adds to the controller's output at the process [%]; or when [s] and size.
         By default after a twentieth of the time, and after half of it. They count from the first scan at or after that time; a size
@@ -159,7 +162,7 @@ def ran(made: Trial, forced: Engine | None = None) -> Simulation:
     pv, out, choice = run_trial(made, forced)
     return Simulation(
         made.settings, made.process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
-        made.load_step, choice, made.initial,
+        made.load_step, choice, made.initial, made.note,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from pidemu.analysis.figures import scan_for, settling_time
 from pidemu.analysis.open_loop import low_frequency_sign
 from pidemu.arrays import Floats
+from pidemu.card.model.card_file import default_scan
 from pidemu.controller.bench import Bench, limits_in_percent
 from pidemu.controller.controller import Controller
 from pidemu.errors import ProcessError
@@ -27,6 +28,8 @@ Step = tuple[float, float]
 
 _DEFAULT_SCANS: Final = 50_000
 """The default duration ends here."""
+_ENOUGH_SCANS: Final = 100_000
+"""For more than so many the card's scan interval is not shortened."""
 _MOST_SCANS: Final = 20_000_000
 
 
@@ -52,6 +55,8 @@ class Trial:
         Setpoint, measurement and output before [%].
     setpoint_step, load_step : tuple of float or None
         When and how far setpoint and load step [s, %].
+    note : str
+        Why the scan interval is longer than the loop would take; empty where it is not.
     """
 
     settings: Settings
@@ -63,6 +68,7 @@ class Trial:
     initial: tuple[float, float, float]
     setpoint_step: Step | None
     load_step: Step | None
+    note: str = ""
 
     @property
     def times(self) -> Floats:
@@ -134,10 +140,11 @@ def trial(
 ) -> Trial:
     """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
     process.check_percent()
-    h = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
-    if not h > 0:
-        raise ProcessError(f"the scan interval {h:g} s is not a positive number; give the time between two scans")
-    length = _duration(settings, process, h) if time is None else plausible("time", time, TIME, ProcessError)
+    own = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
+    if not own > 0:
+        raise ProcessError(f"the scan interval {own:g} s is not a positive number; give the time between two scans")
+    length = _duration(settings, process, own) if time is None else plausible("time", time, TIME, ProcessError)
+    h = own if scan is not None else _affordable(own, default_scan(settings.equation), length)
     if not h <= length < _MOST_SCANS * h:
         raise ProcessError(
             f"a simulation of {length:g} s, scanned every {h:g} s, cannot be run; give a time of a few responses, "
@@ -154,7 +161,24 @@ def trial(
             f"other limits such as output_limits=(0, 100)"
         )
     scans = math.floor(length / h * (1 + 1e-12)) + 1
-    return Trial(settings, process, h, scans, chosen, limits, initial, sp_step, load_step)
+    note = (
+        ""
+        if h == own
+        else (
+            f"a scan interval of {h:g} s is taken, since with the {own:g} s that suit this loop the run would have more than "
+            f"{_ENOUGH_SCANS:,} scans; give the interval, or a shorter time"
+        )
+    )
+    return Trial(settings, process, h, scans, chosen, limits, initial, sp_step, load_step, note)
+
+
+def _affordable(h: float, cards: float, length: float) -> float:
+    """Return a scan interval that nobody asked for: longer, up to the card's, where the run would have too many scans [s]."""
+    least = length / _ENOUGH_SCANS
+    if not h < least:
+        return h
+    digit = 10.0 ** (1 - math.floor(math.log10(least)))
+    return min(cards, math.ceil(least * digit - 1e-9) / digit)
 
 
 def _duration(settings: Settings, process: Process, h: float) -> float:
