@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 import pidemu
 from pidemu.card.library import card_files
 from tests.backends.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
+from tests.backends.node import evaluated, needs_node
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, told
 
@@ -158,6 +160,10 @@ def test_scan_interval_action_and_limits_are_in_the_c(folder: Path) -> None:
     ("words", "message"),
     [
         ("--lang c --name 2nd", "error: '2nd' is not a name in C; give letters, digits and single underscores, a letter first\n"),
+        (
+            "--lang js --name class",
+            "error: 'class' is a word of JavaScript or of what is printed; give another name, such as class_control\n",
+        ),
         ("--lang c --name double", "error: 'double' is a word of C or C++; give another name, such as double_control\n"),
         ("--name level", "--name names the file of a Python module; give --out as well\n"),
         ("--lang c --out taken/inside", "error: taken/inside/fisher_provox.h: cannot be written: Not a directory\n"),
@@ -229,3 +235,24 @@ def test_no_text_of_a_card_gets_out_of_a_comment(folder: Path) -> None:
     told("code", *words, "--lang", "c", "--out", ".", "--name", "level")
     if COMPILER is not None:
         assert refused("-std=c99", *WARNINGS, "-c", "level.c", folder=folder) == ""
+
+
+# --- JavaScript -----------------------------------------------------------------------------------------------------------------
+
+
+@needs_node
+def test_the_javascript_file_gives_the_controllers_outputs_in_node(folder: Path) -> None:
+    assert told("code", *_PROVOX, "--lang", "js", "--out", ".", "--name", "level") == "level.js\n"
+    text = """
+        const level = require("./level.js"), state = level.initial(), outputs = [];
+        for (let i = 0; i < 60; i++) outputs.push(level.scan(state, 50 + i % 7, 48 - 0.1 * i, i > 9, i > 4 ? 30 : NaN));
+        console.log(JSON.stringify(outputs));
+    """
+    assert json.loads(evaluated(text, folder)) == outputs_of_the_controller()
+
+
+def test_javascript_on_stdout_is_what_the_file_holds_and_names_what_it_rests_on(folder: Path) -> None:
+    told("code", *_PROVOX, "--lang", "js", "--out", ".")
+    text = told("code", *_PROVOX, "--lang", "js")
+    assert (folder / "fisher_provox.js").read_text() == text
+    assert text.splitlines()[3:5] == [f"// {line}" for line in _RESTS_ON[:2]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -20,13 +21,15 @@ from pidemu.files.writing import beside
 from pidemu.program.ir import Program
 from pidemu.settings.settings import Settings
 
+_ENDINGS: Final = {"python": "py", "js": "js"}
+
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
-@click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
+@click.option("--lang", type=click.Choice(["python", "c", "js"]), default="python", show_default=True, help="Language.")
 @click.option("--name", metavar="NAME", help="The name of files, types and functions; by default the card's.")
-@click.option("--out", type=OutputArgument("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
+@click.option("--out", type=OutputArgument("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, NAME.py or NAME.js there.")
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option
 @limits_option
@@ -46,12 +49,10 @@ def command(
 
     Its head names what the program rests on and no source of the card states: rules, windup, transfer, limits.
     """
-    from pidemu.backends.c import check_name
-
     if name is not None and lang == "python" and out is None:
         raise click.UsageError("--name names the file of a Python module; give --out as well")
     if name is not None:
-        check_name(name)
+        _check_name(name, lang)
     loaded = load_card(card, vendors)
     settings = loaded.settings(assignments(values))
     program = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits).program
@@ -78,11 +79,24 @@ def _name(card_id: str) -> str:
     return name if name[:1].isalpha() else f"pid_{name}".rstrip("_")
 
 
+def _check_name(name: str, lang: str) -> None:
+    """Refuse a name that is none in the language; the file of a Python module is named as one of C."""
+    if lang == "js":
+        from pidemu.backends.javascript import check_name
+    else:
+        from pidemu.backends.c import check_name
+    check_name(name)
+
+
 def _printed(program: Program, lang: str, name: str, notes: Sequence[str]) -> str:
     if lang == "c":
         from pidemu.backends.c import single
 
         return single(program, name, notes)
+    if lang == "js":
+        from pidemu.backends.javascript import source as script
+
+        return script(program, name, notes)
     from pidemu.backends.python import source
 
     return source(program, notes)
@@ -93,7 +107,7 @@ def _files(program: Program, lang: str, name: str, notes: Sequence[str]) -> dict
         from pidemu.backends.c import header, source
 
         return {f"{name}.h": header(program, name, notes), f"{name}.c": source(program, name, notes)}
-    return {f"{name}.py": _printed(program, lang, name, notes)}
+    return {f"{name}.{_ENDINGS[lang]}": _printed(program, lang, name, notes)}
 
 
 def _write(path: Path, text: str) -> None:
