@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from pidemu.simulation.simulate import Simulation, simulate
     from pidemu.tuning.rules import TuningRule, tuning_rules
     from pidemu.tuning.tune import Tuning, tune
+    from pidemu.vector_sets.vector_set import VectorSet
+    from pidemu.vector_sets.vectors import vectors
 
 __version__ = "0.1.0"
 
@@ -113,6 +115,8 @@ _HOMES = {
     "tune": "tuning.tune",
     "TuningRule": "tuning.rules",
     "tuning_rules": "tuning.rules",
+    "VectorSet": "vector_sets.vector_set",
+    "vectors": "vector_sets.vectors",
 }
 
 __all__ = [
@@ -154,6 +158,7 @@ __all__ = [
     "TuningError",
     "TuningRule",
     "UnitError",
+    "VectorSet",
     "Verification",
     "__version__",
     "cards",
@@ -172,6 +177,7 @@ __all__ = [
     "test_batch",
     "tune",
     "tuning_rules",
+    "vectors",
     "verify",
 ]
 
