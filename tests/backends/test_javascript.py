@@ -20,8 +20,8 @@ from pidemu.errors import EngineError
 from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Line, Name, Number, Program, Quantity, Select
 from tests.backends.node import evaluated, needs_node, play
-from tests.backends.test_engines_agree import CARDS, record, settings_of
-from tests.backends.test_hostile_texts import programs, retold
+from tests.backends.records import CARDS, record, settings_of
+from tests.backends.texts import programs, retold
 from tests.helpers import Floats
 from tests.hostile import hostile_text
 

@@ -11,12 +11,12 @@ import pytest
 import pidemu
 from pidemu.backends.python import compiled, starting
 from pidemu.backends.structured_text import source
-from pidemu.backends.structured_text_block import Dial
+from pidemu.backends.structured_text_block import PrintedDial
 from pidemu.backends.structured_text_expressions import DIALECTS
 from pidemu.program.builder import build
 from pidemu.program.ir import Program
+from tests.backends.records import CARDS, record, settings_of
 from tests.backends.structured_text import Instance, is_there, read, read_rockwell
-from tests.backends.test_engines_agree import CARDS, record, settings_of
 from tests.helpers import Floats
 
 
@@ -42,7 +42,9 @@ def in_python(program: Program, signals: list[Floats]) -> list[float]:
 
 
 def block_of(program: Program, dialect: Any) -> Instance:
-    text = source(program, "control", [Dial("Kp", 1.0, "-"), Dial("INT", 2.0, "s"), Dial("N", 3.0, "-")], dialect=dialect)
+    text = source(
+        program, "control", [PrintedDial("Kp", 1.0, "-"), PrintedDial("INT", 2.0, "s"), PrintedDial("N", 3.0, "-")], dialect=dialect
+    )
     return read_rockwell(text) if dialect == "rockwell" else read(text)["control"]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from pidemu.backends.comments import comment_text
-from pidemu.backends.javascript_expressions import WORDS, Writer, literal
+from pidemu.backends.javascript_expressions import WORDS, ScriptWriter, literal
 from pidemu.backends.names import names_of, respelt
 from pidemu.errors import EngineError
 from pidemu.program.ir import Binary, Cast, Expr, Floor, Line, Precision, Program, Quantity, Select, names_in
@@ -192,7 +192,7 @@ class _Script:
             yield f"Object.assign(state, {{ {', '.join(names[q.name] for q in program.states)} }});"
 
     def _assignments(self) -> Iterator[str]:
-        writer = Writer(self._program, self._names)
+        writer = ScriptWriter(self._program, self._names)
         times = [a.name for a in self._body]
         there = {q.name for q in (*self._program.states, *self._program.inputs, *self._program.coefficients)}
         for assign in self._body:

@@ -43,7 +43,7 @@ def literal(value: float, precision: Precision) -> str:
     return repr(value) if precision == "float64" or short else f"Math.fround({value!r})"
 
 
-class Writer:
+class ScriptWriter:
     """Prints expressions whose precisions are explicit (`pidemu.program.precision.explicit`).
 
     An operation of two float32 numbers is rounded once by `Math.fround`: computed in float64 first, it has the same bits, since

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from pidemu.backends.comments import comment_text
-from pidemu.backends.structured_text_block import GROUPS, Block, Dial, Group, Variable, block_of
+from pidemu.backends.structured_text_block import GROUPS, FunctionBlock, Group, PrintedDial, Variable, block_of
 from pidemu.backends.structured_text_expressions import Dialect
 from pidemu.backends.structured_text_names import check_name
 from pidemu.backends.structured_text_self_test import SelfTest, self_test_block
@@ -41,7 +41,7 @@ _WIDTH: Final = 120
 def source(
     program: Program,
     name: str,
-    dials: Sequence[Dial] = (),
+    dials: Sequence[PrintedDial] = (),
     notes: Sequence[str] = (),
     *,
     dialect: Dialect = "iec",
@@ -55,7 +55,7 @@ def source(
         What to print.
     name : str
         The block's name.
-    dials : sequence of Dial
+    dials : sequence of PrintedDial
         The vendor's settings, which stand in the block for reading.
     notes : sequence of str
         What stands in the comment at the top, below the title, a line each.
@@ -93,12 +93,12 @@ def source(
     return "\n".join(parts) + "\n"
 
 
-def about(block: Block, notes: Sequence[str]) -> list[str]:
+def about(block: FunctionBlock, notes: Sequence[str]) -> list[str]:
     """Return what stands at the top of a block, a line each.
 
     Parameters
     ----------
-    block : Block
+    block : FunctionBlock
         The block.
     notes : sequence of str
         Any texts.
@@ -145,7 +145,7 @@ def _declared(v: Variable) -> str:
     return f"{code:<{_COMMENT}}(* {comment_text(v.text)} *)" if v.text else code
 
 
-def _tags(block: Block) -> list[str]:
+def _tags(block: FunctionBlock) -> list[str]:
     """Return the tags of an instruction as a table."""
     rows = [("Name", "Usage", "Type", "Default", "Description")]
     for v in block.variables:

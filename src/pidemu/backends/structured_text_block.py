@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from pidemu.backends.comments import comment_text
-from pidemu.backends.structured_text_expressions import TYPES, Dialect, Writer, is_given, literal
+from pidemu.backends.structured_text_expressions import TYPES, Dialect, StatementWriter, is_given, literal
 from pidemu.backends.structured_text_names import given_flag, identifiers
 from pidemu.errors import EngineError
 from pidemu.program.ir import Assign, Binary, Cast, Expr, Floor, Line, Name, Precision, Program, Quantity, Select
@@ -29,7 +29,7 @@ _WHOLE: Final[Mapping[Precision, str]] = {"float64": "4503599627370496.0", "floa
 
 
 @dataclass(frozen=True, slots=True)
-class Dial:
+class PrintedDial:
     """A vendor's setting as it is printed.
 
     Attributes
@@ -47,9 +47,9 @@ class Dial:
     unit: str
 
 
-def dials(settings: Settings) -> list[Dial]:
+def dials(settings: Settings) -> list[PrintedDial]:
     """Return the settings at work as they are printed."""
-    return [Dial(name, x.value, x.unit) for name, x in settings.items() if x.active]
+    return [PrintedDial(name, x.value, x.unit) for name, x in settings.items() if x.active]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Block:
+class FunctionBlock:
     """A function block.
 
     Attributes
@@ -112,7 +112,7 @@ class Block:
         return any(v.group == "input" and v.name == self.names[given_flag(name)] for v in self.variables)
 
 
-def block_of(program: Program, name: str, settings: Sequence[Dial], dialect: Dialect) -> Block:
+def block_of(program: Program, name: str, settings: Sequence[PrintedDial], dialect: Dialect) -> FunctionBlock:
     """Return a program as a function block.
 
     Parameters
@@ -121,7 +121,7 @@ def block_of(program: Program, name: str, settings: Sequence[Dial], dialect: Dia
         The program.
     name : str
         The block's name.
-    settings : sequence of Dial
+    settings : sequence of PrintedDial
         The vendor's settings.
     dialect : {"iec", "scl", "rockwell"}
         For whom.
@@ -146,11 +146,11 @@ class _Maker:
         self._program = program
         self._names = dict(names)
         self._dialect = dialect
-        self._writer = Writer(program, self._names, dialect)
+        self._writer = StatementWriter(program, self._names, dialect)
         self._body = explicit(program)
         self._wholes: list[tuple[str, Precision]] = []
 
-    def block(self, name: str, settings: Sequence[Dial], vendor: Mapping[str, str]) -> Block:
+    def block(self, name: str, settings: Sequence[PrintedDial], vendor: Mapping[str, str]) -> FunctionBlock:
         """Return the block."""
         statements = tuple(self._statements())
         kind = self._program.precision
@@ -163,7 +163,7 @@ class _Maker:
             *self._values(),
         )
         renamed = tuple((old, new) for old, new in vendor.items() if old != new)
-        return Block(name, self._program, self._names, variables, statements, renamed)
+        return FunctionBlock(name, self._program, self._names, variables, statements, renamed)
 
     def _type(self, name: str) -> str:
         return TYPES[self._precision(name)]

@@ -84,7 +84,7 @@ def _chosen(x: Expr, then: Callable[[Expr], Expr]) -> Expr:
     return then(x)
 
 
-class Writer:
+class StatementWriter:
     """Prints assignments whose precisions are explicit (`pidemu.program.precision.explicit`).
 
     Parameters

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from pidemu.backends.structured_text import about
-from pidemu.backends.structured_text_block import Dial, Variable, block_of
+from pidemu.backends.structured_text_block import PrintedDial, Variable, block_of
 from pidemu.backends.structured_text_names import check_name
 from pidemu.backends.structured_text_self_test import SelfTest, self_test_block
 from pidemu.program.ir import Program
@@ -22,7 +22,7 @@ _GROUPS: Final = {"input": "inputVars", "output": "outputVars", "setting": "loca
 
 
 def source(
-    program: Program, name: str, dials: Sequence[Dial] = (), notes: Sequence[str] = (), *, test: SelfTest | None = None
+    program: Program, name: str, dials: Sequence[PrintedDial] = (), notes: Sequence[str] = (), *, test: SelfTest | None = None
 ) -> str:
     """Return the project file of a function block.
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from pidemu.backends.structured_text_block import Block, Variable
+from pidemu.backends.structured_text_block import FunctionBlock, Variable
 from pidemu.backends.structured_text_expressions import TYPES, Dialect, literal
 from pidemu.backends.structured_text_names import given_flag
 from pidemu.errors import EngineError
@@ -36,7 +36,7 @@ class SelfTest:
 
 
 @dataclass(frozen=True)
-class TestBlock:
+class TesterBlock:
     """The program: its name, what it is, its variables and statements."""
 
     name: str
@@ -45,12 +45,12 @@ class TestBlock:
     statements: tuple[str, ...]
 
 
-def self_test_block(block: Block, test: SelfTest, dialect: Dialect) -> TestBlock:
+def self_test_block(block: FunctionBlock, test: SelfTest, dialect: Dialect) -> TesterBlock:
     """Return the program that tests a block.
 
     Parameters
     ----------
-    block : Block
+    block : FunctionBlock
         The block.
     test : SelfTest
         The record.
@@ -94,10 +94,10 @@ IF NOT {hash_}done THEN
     {hash_}n := {hash_}n + 1;
 END_IF;"""
     told = tuple(_ABOUT.format(block=block.name).splitlines())
-    return TestBlock(f"{block.name}_TEST", told, (*state, *arrays, outputs), tuple(statements.splitlines()))
+    return TesterBlock(f"{block.name}_TEST", told, (*state, *arrays, outputs), tuple(statements.splitlines()))
 
 
-def _columns(block: Block, test: SelfTest) -> Iterator[tuple[str, tuple[str, list[str]]]]:
+def _columns(block: FunctionBlock, test: SelfTest) -> Iterator[tuple[str, tuple[str, list[str]]]]:
     for q in block.program.inputs:
         values = test.signals[q.name]
         precision: Precision = "float64" if block.program.is_wide(q.name) else "float32"

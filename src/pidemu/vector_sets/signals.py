@@ -38,7 +38,7 @@ class Places:
 
 
 @dataclass
-class Signals:
+class CaseSignals:
     """Columns under way; what is not set is absent."""
 
     places: Places
@@ -64,13 +64,13 @@ class Signals:
             column[n] += by(n) if callable(by) else by
 
 
-def _noise(s: Signals, seed: int, start: int, end: int, size: float) -> None:
+def _noise(s: CaseSignals, seed: int, start: int, end: int, size: float) -> None:
     """Add noise to the measurement; a multiple of 1/64 of the size, the same on every machine."""
     source = random.Random(seed)
     s.move("pv", start, end, lambda _: size * (source.randrange(65) - 32) / 64)
 
 
-def _small_moves(s: Signals, seed: int) -> None:
+def _small_moves(s: CaseSignals, seed: int) -> None:
     size = s.places.size
     s.move("sp", 10, 30, size)
     s.move("sp", 30, 50, -size)
@@ -80,14 +80,14 @@ def _small_moves(s: Signals, seed: int) -> None:
     _noise(s, seed, 95, 120, size)
 
 
-def _linear(places: Places, seed: int) -> Signals:
-    s = Signals(places, 120)
+def _linear(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 120)
     _small_moves(s, seed)
     return s
 
 
-def _saturation(places: Places, seed: int) -> Signals:
-    s = Signals(places, 130)
+def _saturation(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 130)
     for start, end, sign in ((10, 35, 1.0), (35, 70, -1.0), (95, 105, 1.0)):
         s.move("sp", start, end, sign * places.far / 2)
         s.move("pv", start, end, -sign * places.far / 2)
@@ -95,8 +95,8 @@ def _saturation(places: Places, seed: int) -> Signals:
     return s
 
 
-def _manual(places: Places, seed: int) -> Signals:
-    s = Signals(places, 100)
+def _manual(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 100)
     span = places.output_span
     s.move("sp", 10, 100, places.size)
     s.put("auto", 20, 40, 0.0)
@@ -109,8 +109,8 @@ def _manual(places: Places, seed: int) -> Signals:
     return s
 
 
-def _cascade(places: Places, seed: int) -> Signals:
-    s = Signals(places, 100)
+def _cascade(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 100)
     s.put("cascade", 15, 45, lambda n: places.middle + places.size * (1 if n < 30 else -0.5))
     s.put("cascade", 55, 80, lambda n: places.middle + places.size * (n - 55) / 32)
     s.put("auto", 60, 66, 0.0)  # a remote setpoint does not count in manual
@@ -119,8 +119,8 @@ def _cascade(places: Places, seed: int) -> Signals:
     return s
 
 
-def _tracking(places: Places, seed: int) -> Signals:
-    s = Signals(places, 100)
+def _tracking(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 100)
     s.put("track", 20, 35, lambda n: places.output + places.output_span * (n - 24) / 64)
     s.put("track", 55, 65, places.output + places.output_span / 8)
     s.put("auto", 50, 60, 0.0)  # from manual to tracking, and from tracking to automatic
@@ -130,8 +130,8 @@ def _tracking(places: Places, seed: int) -> Signals:
     return s
 
 
-def _faults(places: Places, seed: int) -> Signals:
-    s = Signals(places, 100)
+def _faults(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 100)
     s.move("sp", 10, 100, places.size)
     _noise(s, seed, 10, 100, places.size)
     for name, start, end, value in (
@@ -144,8 +144,8 @@ def _faults(places: Places, seed: int) -> Signals:
     return s
 
 
-def _intervals(places: Places, seed: int) -> Signals:
-    s = Signals(places, 80)
+def _intervals(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 80)
     _noise(s, seed, 10, 80, places.size)
     s.put("interval", 0, 80, places.scan)
     for start, factor in ((20, 2.0), (30, 0.5), (40, 0.0), (50, 1.5)):
@@ -153,22 +153,22 @@ def _intervals(places: Places, seed: int) -> Signals:
     return s
 
 
-def _external_reset(places: Places, seed: int) -> Signals:
-    s = Signals(places, 80)
+def _external_reset(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 80)
     s.put("external_reset", 15, 50, lambda n: places.output + places.output_span * (1 if n < 30 else -1) / 8)
     _noise(s, seed, 10, 80, places.size)
     return s
 
 
-def _feedforward(places: Places, seed: int) -> Signals:
-    s = Signals(places, 80)
+def _feedforward(places: Places, seed: int) -> CaseSignals:
+    s = CaseSignals(places, 80)
     s.put("feedforward", 15, 40, places.output_span / 16)
     s.put("feedforward", 40, 60, -places.output_span / 32)
     _noise(s, seed, 10, 80, places.size)
     return s
 
 
-CASES: Final[dict[str, tuple[str, Callable[[Places, int], Signals]]]] = {
+CASES: Final[dict[str, tuple[str, Callable[[Places, int], CaseSignals]]]] = {
     "linear": ("small steps of the setpoint, ramps, a step and noise of the measurement; no output limit is reached", _linear),
     "saturation": ("large errors, up to an output limit, to the other, and back", _saturation),
     "manual": ("spells in manual: the operator sets the output, or it is held; the setpoint moves meanwhile", _manual),

@@ -51,7 +51,7 @@ class VectorCase:
     name, about : str
         Its name, and what happens in it.
     inputs : mapping
-        Signals by the names of the arguments of `pidemu.Controller.run`; NaN where there is none.
+        CaseSignals by the names of the arguments of `pidemu.Controller.run`; NaN where there is none.
     outputs : tuple of float
         The output of every scan.
     states : mapping

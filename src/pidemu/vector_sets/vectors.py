@@ -17,7 +17,7 @@ from pidemu.settings.action import Action
 from pidemu.settings.ranges import infinite_where_none
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
-from pidemu.vector_sets.signals import CASES, Places, Signals
+from pidemu.vector_sets.signals import CASES, CaseSignals, Places
 from pidemu.vector_sets.vector_set import DialChange, VectorCase, VectorSet
 
 _OPTIONAL: Final = ("manual", "cascade", "track", "external_reset", "feedforward", "interval")
@@ -164,7 +164,7 @@ class _Player:
                     break
         return tuple(found)
 
-    def _played(self, signals: Signals, changes: tuple[DialChange, ...] = ()) -> VectorCase:
+    def _played(self, signals: CaseSignals, changes: tuple[DialChange, ...] = ()) -> VectorCase:
         controller = Controller(self._settings, self._scan, self._action, self._given_limits, engine="python")
         due = {change.scan: change.settings for change in changes}
         outputs, states = list[float](), list[dict[str, float]]()
