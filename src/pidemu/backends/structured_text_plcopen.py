@@ -8,6 +8,7 @@ from typing import Final
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from pidemu.backends.comments import comment_text
 from pidemu.backends.structured_text import about
 from pidemu.backends.structured_text_block import PrintedDial, Variable, block_of
 from pidemu.backends.structured_text_names import check_name
@@ -88,7 +89,7 @@ def _variable(parent: Element, v: Variable) -> None:
     elif v.initial and not v.length:
         SubElement(SubElement(variable, "initialValue"), "simpleValue", {"value": v.initial})
     if v.text:
-        _formatted(SubElement(variable, "documentation"), [v.text])
+        _formatted(SubElement(variable, "documentation"), [comment_text(v.text)])
 
 
 def _formatted(parent: Element, lines: Iterable[str]) -> None:
