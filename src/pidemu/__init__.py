@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     )
     from pidemu.explanation.explain import explain
     from pidemu.explanation.model import Explanation
+    from pidemu.exports.code import Code, code
     from pidemu.fleet.fleet import Fleet
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
@@ -59,6 +60,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Code": "exports.code",
+    "code": "exports.code",
     "cards": "card.library",
     "load_card": "card.library",
     "Card": "card.load",
@@ -125,6 +128,7 @@ __all__ = [
     "Card",
     "CardError",
     "CertificateError",
+    "Code",
     "Comparison",
     "Controller",
     "Conversion",
@@ -162,6 +166,7 @@ __all__ = [
     "Verification",
     "__version__",
     "cards",
+    "code",
     "compare",
     "convert",
     "explain",

@@ -278,7 +278,7 @@ print([blark.parse_source_code(open(file, encoding="utf-8").read()).exception is
 @pytest.mark.skipif(find_spec("blark") is None, reason="blark is not installed")
 def test_blark_reads_blocks_and_their_test(tmp_path: Path) -> None:
     chosen = ["fisher/provox", "toshiba/pid3", "iec/61131-3-pid", "oscat/ft-pidwl", "yokogawa/fieldbus-pid"]
-    files = []
+    files: list[Path] = []
     for card_id in chosen:
         test = short_test(card_id, 3) if card_id == chosen[0] else None
         files.append(tmp_path / f"{len(files)}.st")

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import click
 
-from pidemu.backends.structured_text_expressions import DIALECTS, Dialect
+from pidemu.backends.structured_text_expressions import DIALECTS
 from pidemu.card.library import load_card
-from pidemu.certificate.unverified import facts, unverified_program
-from pidemu.cli.code_text import LANGUAGES, Printing, check_name, files, printed
 from pidemu.cli.common import OutputArgument, action_option, assignments, echo, limits_option, vendors_option
 from pidemu.cli.outputs import inputs
-from pidemu.controller.controller import Controller
 from pidemu.controller.signals import SIGNALS
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
+from pidemu.exports.code import code
+from pidemu.exports.languages import LANGUAGES, Language
 from pidemu.files.reading import reason
 from pidemu.files.writing import beside
 from pidemu.settings.action import Action
-from pidemu.settings.settings import Settings
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
@@ -45,7 +42,7 @@ from pidemu.settings.settings import Settings
 def command(
     card: str,
     values: tuple[str, ...],
-    lang: str,
+    lang: Language,
     dialect: str | None,
     self_test: bool,
     name: str | None,
@@ -66,42 +63,24 @@ def command(
         raise click.UsageError("--dialect is one of Structured Text; give --lang st as well")
     if lang not in ("st", "plcopen") and self_test:
         raise click.UsageError("--self-test prints a program for a PLC; give --lang st or plcopen as well")
-    if name is not None:
-        check_name(name, lang)
-    loaded = load_card(card, vendors)
-    settings = loaded.settings(assignments(values))
+    settings = load_card(card, vendors).settings(assignments(values))
     kind: Action = "direct" if action == "direct" else "reverse"
-    controller = Controller(settings, scan, kind, limits)
-    controller.listen(*signals)
-    program = controller.program
-    notes = _notes(settings, scan=scan is not None, limits=limits is not None)
-    test = None
-    if self_test:
-        from pidemu.vector_sets.block_test import block_test
-        from pidemu.vector_sets.vectors import vectors
-
-        test = block_test(program, vectors(settings, scan, action=kind, output_limits=limits))
-    chosen: Dialect = next((d for d in DIALECTS if d == dialect), "iec")
-    what = Printing(program, settings, name or _name(loaded.id), notes, chosen, test)
+    found = code(
+        settings,
+        lang,
+        name=name,
+        scan=scan,
+        action=kind,
+        output_limits=limits,
+        signals=signals,
+        dialect=next((d for d in DIALECTS if d == dialect), "iec"),
+        self_test=self_test,
+    )
     if out is None:
-        click.echo(printed(what, lang), nl=False)
+        click.echo(found.text, nl=False)
         return
-    for file, text in files(what, lang).items():
+    for file, text in found.files.items():
         _write(Path(out) / file, text)
-
-
-def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
-    """Return what the head says of the card's evidence."""
-    found = facts(unverified_program(settings, scan=scan, limits=limits))
-    if not found:
-        return [f"Every field of the card {settings.card.id} that makes this program is documented or measured."]
-    return [f"Assumed or inferred in the card {settings.card.id}, and at work here:", *(f"- {fact}" for fact in found)]
-
-
-def _name(card_id: str) -> str:
-    """Return a name in C after a card: its letters and digits, one underscore for anything else."""
-    name = re.sub(r"[^A-Za-z0-9]+", "_", card_id).strip("_")
-    return name if name[:1].isalpha() else f"pid_{name}".rstrip("_")
 
 
 def _write(path: Path, text: str) -> None:

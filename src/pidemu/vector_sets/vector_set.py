@@ -75,7 +75,7 @@ class VectorCase:
         return {
             **self.pinned(),
             "about": self.about,
-            "states": {name: _column(x, absent="NaN") for name, x in self.states.items()},
+            "states": {name: _column(x, absent="nan") for name, x in self.states.items()},
             "events": [
                 {"scan": e.scan, "kind": e.kind, "text": e.text, "bump": _word(e.bump), "scans": e.scans} for e in self.events
             ],
@@ -86,8 +86,8 @@ class VectorCase:
         bad = ("sp", "pv")  # where NaN is what came, and not nothing
         return {
             "name": self.name,
-            "inputs": {name: _column(x, absent="NaN" if name in bad else None) for name, x in self.inputs.items()},
-            "outputs": _column(self.outputs, absent="NaN"),
+            "inputs": {name: _column(x, absent="nan" if name in bad else None) for name, x in self.inputs.items()},
+            "outputs": _column(self.outputs, absent="nan"),
             "changes": [{"scan": c.scan, "settings": dict(c.settings)} for c in self.changes],
         }
 
@@ -205,8 +205,8 @@ class VectorSet:
 
 
 def _word(x: float) -> float | str:
-    """Return a number as JSON holds it: the words are those of JavaScript, which Python's and C's readers know as well."""
-    return x if math.isfinite(x) else "NaN" if math.isnan(x) else "Infinity" if x > 0 else "-Infinity"
+    """Return a number as JSON holds it."""
+    return x if math.isfinite(x) else "nan" if math.isnan(x) else "inf" if x > 0 else "-inf"
 
 
 def _column(values: Iterable[float], absent: str | None) -> list[float | str | None]:

@@ -1,15 +1,19 @@
-"""What ``pidemu code`` prints: a program in each language, and the files that hold it."""
+"""The languages that a scan program is printed in, and the files that hold it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from pidemu.backends.structured_text_expressions import Dialect
-from pidemu.backends.structured_text_self_test import SelfTest
 from pidemu.program.ir import Program
 from pidemu.settings.settings import Settings
+
+if TYPE_CHECKING:
+    from pidemu.backends.structured_text_self_test import SelfTest
+
+Language = Literal["python", "c", "js", "st", "plcopen"]
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def _plcopen(p: Printing) -> str:
     return source(p.program, p.name, dials(p.settings), p.notes, test=p.test)
 
 
-_PRINTERS: Final[dict[str, Callable[[Printing], str]]] = {
+_PRINTERS: Final[dict[Language, Callable[[Printing], str]]] = {
     "python": _python,
     "c": _c,
     "js": _javascript,
@@ -80,15 +84,15 @@ _PRINTERS: Final[dict[str, Callable[[Printing], str]]] = {
     "plcopen": _plcopen,
 }
 LANGUAGES: Final = tuple(_PRINTERS)
-_ENDINGS: Final = {"python": "py", "js": "js", "st": "st", "plcopen": "xml"}
+_ENDINGS: Final[dict[Language, str]] = {"python": "py", "c": "c", "js": "js", "st": "st", "plcopen": "xml"}
 
 
-def printed(p: Printing, lang: str) -> str:
+def printed(p: Printing, lang: Language) -> str:
     """Return a program as one text of a language."""
     return _PRINTERS[lang](p)
 
 
-def files(p: Printing, lang: str) -> dict[str, str]:
+def files(p: Printing, lang: Language) -> dict[str, str]:
     """Return the files of a program in a language, text by name."""
     if lang == "c":
         from pidemu.backends.c import header, source
@@ -98,7 +102,7 @@ def files(p: Printing, lang: str) -> dict[str, str]:
     return {f"{p.name}.{ending}": printed(p, lang)}
 
 
-def check_name(name: str, lang: str) -> None:
+def check_name(name: str, lang: Language) -> None:
     """Refuse a name that is none in the language; the file of a Python module is named as one of C.
 
     Raises
