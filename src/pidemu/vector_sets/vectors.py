@@ -111,7 +111,10 @@ class _Player:
         except UndefinedError:  # an algorithm without a continuous law
             size = _SIZE
         short = float(f"{size * span / 100:.2g}")  # the same on every machine
-        return Places((low + high) / 2, short, 0.8 * span, bottom + 0.375 * (top - bottom), top - bottom, self._scan)
+        around_zero = bottom == -top and self._settings.pv_range is None
+        return Places(
+            0.0 if around_zero else (low + high) / 2, short, 0.8 * span, bottom + 0.375 * (top - bottom), top - bottom, self._scan
+        )
 
     def _unsaturated(self, places: Places) -> Places:
         """Return places with which the linear case stays between the output limits."""
