@@ -313,6 +313,8 @@ class Parser:
         return lambda scope: scope[token]
 
     def _function(self, name: str) -> Evaluate:
+        if name == "expt":
+            return self._power()
         operand = self._expression()
         self.take(")")
         function, kind = _FUNCTIONS[name]
@@ -324,6 +326,13 @@ class Parser:
             return function(found)
 
         return evaluate
+
+    def _power(self) -> Evaluate:
+        base = self._expression()
+        self.take(",")
+        exponent = self._expression()
+        self.take(")")
+        return lambda scope: float(base(scope)) ** float(exponent(scope))
 
 
 def _truth(x: Value) -> bool:

@@ -29,6 +29,7 @@ from pidemu.card.library import card_files
 from pidemu.errors import EngineError
 from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Line, Name, Number, Program, Quantity, Select
+from tests.backends.matiec import needs_matiec, play_test
 from tests.backends.records import CARDS, record, settings_of
 from tests.backends.structured_text import Instance, is_there, read, read_rockwell, tokens_of
 from tests.backends.texts import programs, retold
@@ -289,3 +290,12 @@ def test_blark_reads_blocks_and_their_test(tmp_path: Path) -> None:
     words = [sys.executable, "-c", _BLARK, *map(str, [*files, wrong])]
     told = subprocess.run(words, capture_output=True, text=True, timeout=300, check=True).stdout
     assert told == f"{[*([True] * len(files)), False]}\n"
+
+
+@needs_matiec
+@pytest.mark.parametrize("card_id", CARDS)
+def test_matiec_compiles_the_block_and_its_test_says_ok(card_id: str, tmp_path: Path) -> None:
+    chosen = settings_of(card_id)
+    program = pidemu.Controller(chosen).program
+    text = source(program, "control", dials(chosen), ["a note"], test=short_test(card_id))
+    assert play_test(tmp_path, text) == "1 -1"

@@ -30,7 +30,7 @@ _ABOUT: Final = """\
 Not run on a controller. One call is one scan: call it at the scan interval named above. The outputs are pidemu's bit by bit
 where {kind} is that of IEEE 754 and expressions are evaluated as written.
 SP and PV are numbers: a NaN that enters stays in what is kept, so look at signals before the call. A signal that may be absent
-has a flag, such as MANUAL_GIVEN; NaN is not asked for. No infinity is written: the largest number stands for it.
+has a flag, such as MANUAL_GIVEN; NaN is not asked for. Where there is no limit, nothing is compared.
 Sections are those of pidemu's specs/equations.md."""
 _ROCKWELL: Final = """\
 Make an Add-On Instruction {name} with these parameters and local tags; what follows is its Logic routine."""

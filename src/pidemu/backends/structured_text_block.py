@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -9,6 +10,7 @@ from typing import Final, Literal
 from pidemu.backends.comments import comment_text
 from pidemu.backends.structured_text_expressions import TYPES, Dialect, StatementWriter, is_given, literal
 from pidemu.backends.structured_text_names import given_flag, identifiers
+from pidemu.backends.structured_text_numbers import TINY, with_tiny, without_infinity
 from pidemu.errors import EngineError
 from pidemu.program.ir import Assign, Binary, Cast, Expr, Floor, Line, Name, Precision, Program, Quantity, Select
 from pidemu.program.precision import explicit
@@ -135,6 +137,9 @@ def block_of(program: Program, name: str, settings: Sequence[PrintedDial], diale
         raise EngineError(
             "this program computes partly in LREAL, partly in REAL, which Rockwell cannot mix; use --dialect iec or scl"
         )
+    program = without_infinity(program)
+    program = with_tiny(program) if dialect == "iec" else program
+    settings = [d for d in settings if math.isfinite(d.value)]
     names, vendor = identifiers(program, name, (d.name for d in settings))
     return _Maker(program, names, dialect).block(name, settings, vendor)
 
@@ -158,7 +163,7 @@ class _Maker:
             *self._inputs(),
             *self._output(),
             *(Variable("setting", vendor[d.name], TYPES[kind], literal(d.value, kind), f"[{d.unit}]") for d in settings),
-            *self._quantities("coefficient", self._program.coefficients, self._program.values),
+            *self._coefficients(),
             *self._kept(),
             *self._values(),
         )
@@ -197,9 +202,16 @@ class _Maker:
             initial = literal(value, self._precision(q.name))
             yield Variable(group, self._names[q.name], self._type(q.name), initial, f"{q.text} [{q.unit}]")
 
+    def _coefficients(self) -> Iterator[Variable]:
+        pairs = [(q, x) for q, x in zip(self._program.coefficients, self._program.values, strict=True) if q.name != TINY]
+        yield from self._quantities("coefficient", [q for q, _ in pairs], [x for _, x in pairs])
+
     def _kept(self) -> Iterator[Variable]:
         kept = [(q, x) for q, x in zip(self._program.states, self._program.initial, strict=True) if q.name != self._program.output]
         yield from self._quantities("state", [q for q, _ in kept], [x for _, x in kept])
+        for q in self._program.coefficients:
+            if q.name == TINY:
+                yield Variable("state", self._names[TINY], "LREAL", "0.0", q.text)
         for line, length in zip(self._program.lines, self._program.lengths, strict=True):
             text = f"{line.text} [{line.unit}]"
             yield Variable("state", self._line(line), self._type(line.source), "0.0", text, length)
@@ -222,6 +234,9 @@ class _Maker:
             yield Variable("value", "whole_number", "LINT", "", "for rounding down")
 
     def _statements(self) -> Iterator[str]:
+        if any(q.name == TINY for q in self._program.coefficients):
+            tiny = self._names[TINY]
+            yield from (f"IF {tiny} = 0.0 THEN", f"    {tiny} := EXPT(10.0, -300.0);", "END_IF;")
         for line in self._program.lines:
             place = f"{self._local(self._line(line))}[{self._local(self._line(line))}_at]"
             yield f"{self._writer.name(line.name)} := {place};"

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from pidemu.backends.structured_text_names import given_flag
+from pidemu.backends.structured_text_numbers import TINY
 from pidemu.program.ir import Assign, Binary, Cast, Expr, Floor, Name, Number, Precision, Program, Select
 
 Dialect = Literal["iec", "scl", "rockwell"]
@@ -172,6 +173,8 @@ class StatementWriter:
                 return _number(value, precision)
             case Cast(operand=operand, precision=precision):
                 return self._converted(operand, precision), _ATOM
+            case Binary(operator="-", left=Number(value=0.0), right=Name(id=name)) if name == TINY:
+                return f"-{self.name(name)}", _UNARY
             case Binary():
                 return self._binary(x)
         raise TypeError(f"no Structured Text for {type(x).__name__}")
