@@ -10,10 +10,15 @@ import pytest
 import pidemu
 from pidemu.arrays import Floats
 from pidemu.card.library import card_files
+from pidemu.card.load import variants
 from pidemu.checks.runs import plausible
+from pidemu.errors import PidemuError
+from pidemu.program.builder import build
+from pidemu.program.ir import Program
 from pidemu.settings.ranges import PERCENT
 from pidemu.settings.settings import Settings
 
+ALL_SIGNALS = ("cascade", "track", "reset", "feedforward")
 CARDS = [pytest.param(card_id, id=card_id) for card_id in card_files()]
 SCANS = 600
 
@@ -39,3 +44,28 @@ def record(settings: Settings, seed: int, *, bad: bool = True) -> dict[str, Floa
     if bad:
         found["pv"][chance.integers(0, SCANS, 12)] = chance.choice([np.nan, np.inf, -np.inf], 12)
     return found
+
+
+def programs_of(card_id: str) -> list[Program]:
+    """Return the program that reads every signal, for every choice of a card's options that makes one."""
+    found = []
+    for variant in variants(pidemu.load_card(card_id)):
+        try:
+            algorithm = plausible(variant).algorithm(own_units=True)
+            found.append(build(algorithm, 1.0, signals=ALL_SIGNALS, title=f"{card_id} {variant.choice_text}"))
+        except PidemuError:  # options that are not defined together
+            continue
+    assert found
+    return found
+
+
+def modes(program: Program, seed: int, scans: int = 80) -> list[Floats]:
+    """Return signals of a program that come and go at random."""
+    chance = np.random.default_rng(seed)
+    signals = []
+    for q in program.inputs:
+        column = chance.integers(0, 2, scans).astype(float) if q.name == "auto" else chance.uniform(0, 100, scans)
+        if q.name not in ("sp", "pv", "auto", "feedforward"):
+            column[chance.random(scans) < 0.6] = np.nan
+        signals.append(column)
+    return signals

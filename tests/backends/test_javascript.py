@@ -17,10 +17,9 @@ import pidemu
 from pidemu.backends.javascript import source
 from pidemu.backends.python import compiled, starting
 from pidemu.errors import EngineError
-from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Line, Name, Number, Program, Quantity, Select
 from tests.backends.node import evaluated, needs_node, play
-from tests.backends.records import CARDS, record, settings_of
+from tests.backends.records import CARDS, modes, programs_of, record, settings_of
 from tests.backends.texts import programs, retold
 from tests.helpers import Floats
 from tests.hostile import hostile_text
@@ -59,21 +58,15 @@ def test_every_card_gives_the_bits_of_python(card_id: str, tmp_path: Path) -> No
 
 @needs_node
 @pytest.mark.parametrize("card_id", CARDS)
-def test_every_card_with_all_signals_gives_the_bits_of_python_on_odd_numbers(card_id: str, tmp_path: Path) -> None:
-    chosen = settings_of(card_id)
-    asked = ("cascade", "track", "reset", "feedforward")
-    program = build(chosen.algorithm(own_units=True), 1.0, signals=asked, title=card_id)
-    chance = np.random.default_rng(7)
-    signals = []
-    for q in program.inputs:
-        column = chance.integers(0, 2, 300).astype(float) if q.name == "auto" else chance.uniform(0, 100, 300)
-        if q.name not in ("sp", "pv", "auto"):
-            column[chance.random(300) < 0.6] = math.nan
-        if q.name != "auto":
-            hit = np.arange(250, 300)  # what is odd may stay in the states, so the first scans are without
-            column[hit] = np.where(chance.random(50) < 0.3, chance.choice(_ODD, 50), column[hit])
-        signals.append(column)
-    assert in_node(tmp_path, program, signals) == in_python(program, signals)
+def test_every_choice_of_options_gives_the_bits_of_python_on_odd_numbers(card_id: str, tmp_path: Path) -> None:
+    for seed, program in enumerate(programs_of(card_id)):
+        chance = np.random.default_rng(seed)
+        signals = modes(program, seed)
+        for q, column in zip(program.inputs, signals, strict=True):
+            if q.name != "auto":  # what is odd may stay in the states, so the first scans are without
+                hit = np.flatnonzero(chance.random(20) < 0.3) + 60
+                column[hit] = chance.choice(_ODD, hit.size)
+        assert in_node(tmp_path, program, signals) == in_python(program, signals), program.title
 
 
 @needs_node

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import subprocess
 import sys
@@ -27,10 +26,9 @@ from pidemu.backends.structured_text_names import RESERVED
 from pidemu.backends.structured_text_self_test import SelfTest
 from pidemu.card.library import card_files
 from pidemu.errors import EngineError
-from pidemu.program.builder import build
 from pidemu.program.ir import Assign, Line, Name, Number, Program, Quantity, Select
 from tests.backends.matiec import needs_matiec, play_test
-from tests.backends.records import CARDS, record, settings_of
+from tests.backends.records import CARDS, modes, programs_of, record, settings_of
 from tests.backends.structured_text import Instance, is_there, read, read_rockwell, tokens_of
 from tests.backends.texts import programs, retold
 from tests.helpers import Floats
@@ -80,17 +78,10 @@ def test_every_card_gives_the_numbers_of_python(card_id: str, dialect: str) -> N
 
 
 @pytest.mark.parametrize("card_id", CARDS)
-def test_every_card_with_all_signals_gives_the_numbers_of_python(card_id: str) -> None:
-    chosen = settings_of(card_id)
-    program = build(chosen.algorithm(own_units=True), 1.0, signals=("cascade", "track", "reset", "feedforward"), title=card_id)
-    chance = np.random.default_rng(7)
-    signals = []
-    for q in program.inputs:
-        column = chance.integers(0, 2, 200).astype(float) if q.name == "auto" else chance.uniform(0, 100, 200)
-        if q.name not in ("sp", "pv", "auto", "feedforward"):
-            column[chance.random(200) < 0.6] = math.nan
-        signals.append(column)
-    assert outputs_of(block_of(program, "iec"), program, signals) == in_python(program, signals)
+def test_every_choice_of_options_with_all_signals_gives_the_numbers_of_python(card_id: str) -> None:
+    for seed, program in enumerate(programs_of(card_id)):
+        signals = modes(program, seed)
+        assert outputs_of(block_of(program, "iec"), program, signals) == in_python(program, signals), program.title
 
 
 def test_a_delay_line_and_a_name_of_the_language_give_the_numbers_of_python() -> None:
