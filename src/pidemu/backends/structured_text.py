@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Final
 
 from pidemu.backends.comments import comment_text
@@ -127,12 +128,14 @@ def _scl(name: str, variables: Sequence[Variable], statements: Sequence[str]) ->
 
 
 def _sections(variables: Sequence[Variable], sections: Mapping[Group, str]) -> list[list[str]]:
-    groups = dict.fromkeys(v.group for v in variables)
+    """Return the declarations; groups that are declared alike share a section."""
     found = []
-    for group in groups:
-        said = f" (* {GROUPS[group]} *)" if GROUPS[group] else ""
-        members = [_declared(v) for v in variables if v.group == group]
-        found.append([f"{sections[group]}{said}", *members, "END_VAR"])
+    for word, groups in groupby(dict.fromkeys(v.group for v in variables), sections.__getitem__):
+        lines = [word]
+        for group in groups:
+            lines += [f"    (* {GROUPS[group]} *)"] if GROUPS[group] else []
+            lines += [_declared(v) for v in variables if v.group == group]
+        found.append([*lines, "END_VAR"])
     return found
 
 
