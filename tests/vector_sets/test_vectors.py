@@ -96,6 +96,14 @@ def test_what_a_card_has_no_use_for_is_left_out_and_told() -> None:
     }
 
 
+def test_a_case_that_is_not_there_is_told() -> None:
+    found = pidemu.vectors("generic/standard")
+    with pytest.raises(ScanError, match="no case 'feedforward': generic/standard states no feedforward input"):
+        found["feedforward"]
+    with pytest.raises(ScanError, match=r"no case 'liner' \(did you mean 'linear'\?\); cases: linear, "):
+        found["liner"]
+
+
 def test_what_cannot_be_run_is_refused() -> None:
     with pytest.raises(ScanError):
         pidemu.vectors("fisher/provox", scan=-1)

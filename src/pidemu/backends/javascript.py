@@ -188,8 +188,7 @@ class _Script:
             yield _said(f"const {names[line.name]} = state.{self._line(line)}.shift();", line.text, _COMMENT - 4)
         yield from self._assignments()
         yield from (f"state.{self._line(line)}.push({names[line.source]});" for line in program.lines)
-        if program.states:
-            yield f"Object.assign(state, {{ {', '.join(names[q.name] for q in program.states)} }});"
+        yield from (f"state.{names[q.name]} = {names[q.name]};" for q in program.states if q.name in assigned)
 
     def _assignments(self) -> Iterator[str]:
         writer = ScriptWriter(self._program, self._names)

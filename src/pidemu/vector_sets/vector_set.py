@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from pidemu import __version__
 from pidemu.controller.signals import Event
-from pidemu.errors import PidemuError
+from pidemu.errors import PidemuError, ScanError, suggest
 from pidemu.excerpt import printable_json, visible
 from pidemu.files.reading import reason
 from pidemu.files.writing import beside
@@ -137,7 +137,12 @@ class VectorSet:
     left_out: Mapping[str, str]
 
     def __getitem__(self, name: str) -> VectorCase:
-        return next(case for case in self.cases if case.name == name)
+        found = {case.name: case for case in self.cases}
+        if name in self.left_out:
+            raise ScanError(f"no case '{name}': {self.left_out[name]}")
+        if name not in found:
+            raise ScanError(f"no case '{name}'{suggest(name, found)}; cases: {', '.join(found)}")
+        return found[name]
 
     def _head(self) -> dict[str, Any]:
         limits = [x if math.isfinite(x) else None for x in self.limits]
