@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     )
     from pidemu.explanation.explain import explain
     from pidemu.explanation.model import Explanation
+    from pidemu.exports.code import Code, code
     from pidemu.fleet.fleet import Fleet
     from pidemu.fleet.loops import Loop
     from pidemu.fleet.result import FleetResult
@@ -55,10 +56,14 @@ if TYPE_CHECKING:
     from pidemu.tuning.optimise import OptimalTuning, optimise
     from pidemu.tuning.rules import TuningRule, tuning_rules
     from pidemu.tuning.tune import Tuning, tune
+    from pidemu.vector_sets.vector_set import VectorSet
+    from pidemu.vector_sets.vectors import vectors
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Code": "exports.code",
+    "code": "exports.code",
     "cards": "card.library",
     "load_card": "card.library",
     "Card": "card.load",
@@ -119,6 +124,8 @@ _HOMES = {
     "tune": "tuning.tune",
     "TuningRule": "tuning.rules",
     "tuning_rules": "tuning.rules",
+    "VectorSet": "vector_sets.vector_set",
+    "vectors": "vector_sets.vectors",
 }
 
 __all__ = [
@@ -127,6 +134,7 @@ __all__ = [
     "Card",
     "CardError",
     "CertificateError",
+    "Code",
     "Comparison",
     "Controller",
     "Conversion",
@@ -162,9 +170,11 @@ __all__ = [
     "TuningError",
     "TuningRule",
     "UnitError",
+    "VectorSet",
     "Verification",
     "__version__",
     "cards",
+    "code",
     "compare",
     "convert",
     "convert_many",
@@ -182,6 +192,7 @@ __all__ = [
     "test_batch",
     "tune",
     "tuning_rules",
+    "vectors",
     "verify",
 ]
 

@@ -2,50 +2,20 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pidemu
-from pidemu.arrays import Floats
 from pidemu.backends import native
 from pidemu.backends.choice import ENGINES, Engine, block, has_numba
 from pidemu.backends.python import compiled, starting
-from pidemu.card.library import card_files
-from pidemu.checks.runs import plausible
-from pidemu.settings.ranges import PERCENT
-from pidemu.settings.settings import Settings
+from tests.backends.records import CARDS, SCANS, record, settings_of
 
-CARDS = [pytest.param(card_id, id=card_id) for card_id in card_files()]
 COMPILER = pytest.mark.skipif(not native.available(), reason="no C compiler on this machine")
 NUMBA = pytest.mark.skipif(not has_numba(), reason="there is no Numba for this machine")
 OTHERS = [pytest.param(e, marks={"c": COMPILER, "numba": NUMBA}.get(e, ())) for e in ENGINES if e != "python"]
-SCANS = 600
-
-
-def settings_of(card_id: str) -> Settings:
-    return plausible(pidemu.load_card(card_id).variant({}))
-
-
-def record(settings: Settings, seed: int, *, bad: bool = True) -> dict[str, Floats]:
-    """Setpoint steps, a measurement that drives the output to both limits and settles, manual and bad samples."""
-    chance = np.random.default_rng((zlib.crc32(settings.card.id.encode()), seed))
-    low, high = (settings.pv_range or PERCENT).ends
-    span = high - low
-    n = np.arange(SCANS)
-    sp = low + span * chance.random(SCANS // 50).repeat(50)
-    swing = 0.6 * np.sin(n / chance.uniform(10, 40)) * (n % 300 < 150)
-    pv = np.where(
-        n % 300 < 200, low + span * (0.5 + swing + 0.02 * chance.standard_normal(SCANS)), sp + span * 1e-3 * 0.9 ** (n % 100)
-    )
-    found = {"sp": sp, "pv": pv, "auto": (chance.random(SCANS // 30) > 0.3).repeat(30).astype(float)}
-    bottom, top = np.clip(settings.equation.output.limits, -1000, 1000)
-    found["manual"] = np.where(chance.random(SCANS) < 0.4, np.nan, chance.uniform(bottom, top, SCANS))
-    if bad:
-        found["pv"][chance.integers(0, SCANS, 12)] = chance.choice([np.nan, np.inf, -np.inf], 12)
-    return found
 
 
 def same(one: Any, other: Any) -> bool:

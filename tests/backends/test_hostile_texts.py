@@ -9,8 +9,6 @@ import json
 import re
 import sys
 import tokenize
-from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -22,40 +20,13 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu.backends import c, numba_text, numpy_text, numpy_values
 from pidemu.backends.python import source
-from pidemu.program.ir import Assign, Line, Program, Quantity
+from pidemu.program.ir import Program
 from tests.backends.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, refused
+from tests.backends.texts import programs, retold
 from tests.checks.bench import VALID, loaded
 from tests.hostile import CONTROLS, ENCODINGS, MARKS, hostile_names, hostile_text
 
 _WORST = "".join((*ENCODINGS, *MARKS, *CONTROLS))
-
-
-@cache
-def programs() -> tuple[Program, ...]:
-    """Return programs with every kind of text: one in float64, one in float32 with wide numbers, one with delay lines."""
-    plain = (("emerson/deltav", {"GAIN": 2, "RESET": 60, "RATE": 16}), ("iec/61131-3-pid", {"KP": 1, "TR": 8}))
-    found = [pidemu.Controller(pidemu.load_card(name).settings(given)).program for name, given in plain]
-    dahlin = pidemu.load_card("generic/dahlin")
-    values = dict(dahlin.data.examples[-1].given)
-    found.append(pidemu.Controller(dahlin.settings(values)).program)
-    return tuple(found)
-
-
-def retold(program: Program, text: str) -> Program:
-    """Return the program with one text in place of all of its own."""
-
-    def told(q: Quantity) -> Quantity:
-        return replace(q, text=text, unit=text)
-
-    return replace(
-        program,
-        title=text,
-        inputs=tuple(map(told, program.inputs)),
-        coefficients=tuple(map(told, program.coefficients)),
-        states=tuple(map(told, program.states)),
-        lines=tuple(Line(x.name, text, text, x.source) for x in program.lines),
-        body=tuple(Assign(a.name, a.value, text, text) for a in program.body),
-    )
 
 
 def plain_tree(text: str) -> str:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import subprocess
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
 import pidemu
 from pidemu.card.library import card_files
+from pidemu.errors import EngineError
 from tests.backends.c_compiler import COMPILER, CPP, WARNINGS, needs_compiler, needs_cpp, refused
+from tests.backends.node import evaluated, needs_node
+from tests.backends.structured_text import read
 from tests.checks.bench import VALID, written
 from tests.cli.helpers import said, told
 
@@ -158,7 +163,15 @@ def test_scan_interval_action_and_limits_are_in_the_c(folder: Path) -> None:
     ("words", "message"),
     [
         ("--lang c --name 2nd", "error: '2nd' is not a name in C; give letters, digits and single underscores, a letter first\n"),
+        (
+            "--lang js --name class",
+            "error: 'class' is a word of JavaScript or of what is printed; give another name, such as class_control\n",
+        ),
         ("--lang c --name double", "error: 'double' is a word of C or C++; give another name, such as double_control\n"),
+        ("--lang st --name R", "error: 'R' is a word of Structured Text; give another name, such as R_control\n"),
+        ("--lang js --dialect scl", "--dialect is one of Structured Text; give --lang st as well\n"),
+        ("--lang c --self-test", "--self-test prints a program for a PLC; give --lang st or plcopen as well\n"),
+        ("--lang st --dialect rockwell --self-test", "use --self-test with --dialect iec or scl\n"),
         ("--name level", "--name names the file of a Python module; give --out as well\n"),
         ("--lang c --out taken/inside", "error: taken/inside/fisher_provox.h: cannot be written: Not a directory\n"),
     ],
@@ -229,3 +242,75 @@ def test_no_text_of_a_card_gets_out_of_a_comment(folder: Path) -> None:
     told("code", *words, "--lang", "c", "--out", ".", "--name", "level")
     if COMPILER is not None:
         assert refused("-std=c99", *WARNINGS, "-c", "level.c", folder=folder) == ""
+
+
+# --- JavaScript -----------------------------------------------------------------------------------------------------------------
+
+
+@needs_node
+def test_the_javascript_file_gives_the_controllers_outputs_in_node(folder: Path) -> None:
+    assert told("code", *_PROVOX, "--lang", "js", "--out", ".", "--name", "level") == "level.js\n"
+    text = """
+        const level = require("./level.js"), state = level.initial(), outputs = [];
+        for (let i = 0; i < 60; i++) outputs.push(level.scan(state, 50 + i % 7, 48 - 0.1 * i, i > 9, i > 4 ? 30 : NaN));
+        console.log(JSON.stringify(outputs));
+    """
+    assert json.loads(evaluated(text, folder)) == outputs_of_the_controller()
+
+
+def test_javascript_on_stdout_is_what_the_file_holds_and_names_what_it_rests_on(folder: Path) -> None:
+    told("code", *_PROVOX, "--lang", "js", "--out", ".")
+    text = told("code", *_PROVOX, "--lang", "js")
+    assert (folder / "fisher_provox.js").read_text() == text
+    assert text.splitlines()[3:5] == [f"// {line}" for line in _RESTS_ON[:2]]
+
+
+# --- Structured Text ------------------------------------------------------------------------------------------------------------
+
+
+def says_ok(text: str, name: str) -> bool:
+    """Run the self-test that a text holds, and return what it says."""
+    block = read(text)[f"{name}_test"]
+    while not block["done"]:
+        block()
+    return bool(block["ok"])
+
+
+@pytest.mark.parametrize("dialect", ["iec", "scl"])
+@pytest.mark.parametrize("signals", [(), ("cascade", "track", "external_reset")])
+def test_the_printed_self_test_plays_the_vectors_and_says_ok(dialect: str, signals: tuple[str, ...]) -> None:
+    asked = [word for signal in signals for word in ("--signal", signal)]
+    text = told("code", *_PROVOX, "--lang", "st", "--dialect", dialect, "--self-test", "--name", "level", *asked)
+    assert says_ok(text, "level")
+    assert ("CASCADE_GIVEN" in text) is bool(signals)
+    assert not says_ok(text.replace("out := high", "out := low").replace("#out := #high", "#out := #low"), "level")
+
+
+def test_structured_text_names_what_it_rests_on_and_that_it_was_not_run_on_a_controller() -> None:
+    for dialect in ("iec", "scl", "rockwell"):
+        text = told("code", *_PROVOX, "--lang", "st", "--dialect", dialect)
+        assert text.splitlines()[4:6] == [f"  {line}" for line in _RESTS_ON[:2]]
+        assert "\n  Not run on a controller. " in text
+
+
+def test_files_of_structured_text_are_named_after_their_dialect(folder: Path) -> None:
+    assert told("code", *_PROVOX, "--lang", "st", "--out", ".") == "fisher_provox.st\n"
+    assert told("code", *_PROVOX, "--lang", "st", "--dialect", "scl", "--out", ".") == "fisher_provox.scl\n"
+    assert told("code", *_PROVOX, "--lang", "plcopen", "--out", ".") == "fisher_provox.xml\n"
+    ElementTree.fromstring((folder / "fisher_provox.xml").read_text(encoding="utf-8"))
+
+
+def test_the_same_from_python() -> None:
+    settings = pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0.5)
+    for lang in ("python", "c", "js", "st", "plcopen"):
+        assert pidemu.code(settings, lang).text == told("code", *_PROVOX, "--lang", lang)
+    assert [*pidemu.code(settings, "c", name="level").files] == ["level.h", "level.c"]
+    with pytest.raises(EngineError, match="no language 'cobol'; languages: python, c, js, st, plcopen"):
+        pidemu.code(settings, "cobol")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("lang", ["python", "c", "js", "st", "plcopen"])
+def test_signals_that_are_asked_for_are_read_and_others_refused(lang: str) -> None:
+    assert "cascade" in told("code", *_PROVOX, "--lang", lang, "--signal", "cascade").casefold()
+    found = said("code", *_PROVOX, "--lang", lang, "--signal", "feedforward")
+    assert (found.status, found.err) == (2, "error: fisher/provox states no feedforward input; leave the signal out\n")

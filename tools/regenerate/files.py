@@ -19,6 +19,7 @@ from tools.regenerate import (
     pages,
     process_schemas,
     tables,
+    vectors_schema,
 )
 from tools.regenerate.pages import ROOT
 
@@ -62,6 +63,7 @@ _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/fit.schema.json", lambda _: process_schemas.fit_text()),
     Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
     *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "optimum", "robustness", "bode")),
+    Generated("specs/vectors.schema.json", lambda _: vectors_schema.text()),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),
     Generated("docs/matrix.md", lambda _: matrix.page()),

@@ -180,7 +180,11 @@ _FORMS: dict[str, tuple[str, Any]] = {
 
 def text(name: str) -> str:
     """Return the file of a schema: of ``tuning``, ``optimum``, ``robustness`` or ``bode``."""
-    title, model = _FORMS[name]
+    return form(*_FORMS[name])
+
+
+def form(title: str, model: Any) -> str:
+    """Return the file of a schema: its title, and what a model says."""
     plain = model.model_json_schema(by_alias=True, mode="serialization")
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
     found = {**head, **{k: v for k, v in plain.items() if k != "title"}}

@@ -32,6 +32,7 @@ _COMMANDS: Final = {
     "matrix": "Convert typical settings of every card to every card.",
     "verify": "Compute a signed certificate again, and say what changed.",
     "code": "Print the scan program of a card with its settings.",
+    "vectors": "Test vectors of a card, for code in any language.",
 }
 
 

@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
+from pidemu.backends.structured_text_expressions import DIALECTS
 from pidemu.card.library import load_card
-from pidemu.certificate.unverified import facts, unverified_program
 from pidemu.cli.common import OutputArgument, action_option, assignments, echo, limits_option, vendors_option
 from pidemu.cli.inputs import inputs
-from pidemu.controller.controller import Controller
+from pidemu.controller.signals import SIGNALS
 from pidemu.errors import PidemuError
 from pidemu.excerpt import visible
+from pidemu.exports.code import code
+from pidemu.exports.languages import LANGUAGES, Language
 from pidemu.files.reading import reason
 from pidemu.files.writing import beside
-from pidemu.program.ir import Program
-from pidemu.settings.settings import Settings
+from pidemu.settings.action import Action
 
 
 @click.command("code", short_help="Print the scan program of a card with its settings.")
 @click.argument("card")
 @click.argument("values", nargs=-1, metavar="NAME=VALUE...")
-@click.option("--lang", type=click.Choice(["python", "c"]), default="python", show_default=True, help="Language.")
-@click.option("--name", metavar="NAME", help="The name of files, types and functions; by default the card's.")
-@click.option("--out", type=OutputArgument("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, there.")
+@click.option("--lang", type=click.Choice(LANGUAGES), default="python", show_default=True, help="Language; st is Structured Text.")
+@click.option("--dialect", type=click.Choice(DIALECTS), help="Of Structured Text; by default iec, IEC 61131-3.")
+@click.option("--self-test", is_flag=True, help="With st and plcopen: a program too that tests the block in the controller.")
+@click.option("--name", metavar="NAME", help="The name of files, types, functions and blocks; by default the card's.")
+@click.option("--out", type=OutputArgument("folder"), metavar="FOLDER", help="Write NAME.h and NAME.c, or NAME.py, .js, .st there.")
+@click.option(
+    "--signal",
+    "signals",
+    multiple=True,
+    type=click.Choice(list(SIGNALS)),
+    help="A signal that the program reads besides setpoint, measurement, mode and operator's output. Repeatable.",
+)
 @click.option("--scan", type=float, metavar="H", help="Scan interval [s]; by default the card's.")
 @action_option
 @limits_option
@@ -34,9 +42,12 @@ from pidemu.settings.settings import Settings
 def command(
     card: str,
     values: tuple[str, ...],
-    lang: str,
+    lang: Language,
+    dialect: str | None,
+    self_test: bool,
     name: str | None,
     out: str | None,
+    signals: tuple[str, ...],
     scan: float | None,
     action: str,
     limits: tuple[float, float] | None,
@@ -46,54 +57,30 @@ def command(
 
     Its head names what the program rests on and no source of the card states: rules, windup, transfer, limits.
     """
-    from pidemu.backends.c import check_name
-
     if name is not None and lang == "python" and out is None:
         raise click.UsageError("--name names the file of a Python module; give --out as well")
-    if name is not None:
-        check_name(name)
-    loaded = load_card(card, vendors)
-    settings = loaded.settings(assignments(values))
-    program = Controller(settings, scan, "direct" if action == "direct" else "reverse", limits).program
-    notes = _notes(settings, scan=scan is not None, limits=limits is not None)
-    name = name or _name(loaded.id)
+    if lang != "st" and dialect is not None:
+        raise click.UsageError("--dialect is one of Structured Text; give --lang st as well")
+    if lang not in ("st", "plcopen") and self_test:
+        raise click.UsageError("--self-test prints a program for a PLC; give --lang st or plcopen as well")
+    settings = load_card(card, vendors).settings(assignments(values))
+    kind: Action = "direct" if action == "direct" else "reverse"
+    found = code(
+        settings,
+        lang,
+        name=name,
+        scan=scan,
+        action=kind,
+        output_limits=limits,
+        signals=signals,
+        dialect=next((d for d in DIALECTS if d == dialect), "iec"),
+        self_test=self_test,
+    )
     if out is None:
-        click.echo(_printed(program, lang, name, notes), nl=False)
+        click.echo(found.text, nl=False)
         return
-    for file, text in _files(program, lang, name, notes).items():
+    for file, text in found.files.items():
         _write(Path(out) / file, text)
-
-
-def _notes(settings: Settings, *, scan: bool, limits: bool) -> list[str]:
-    """Return what the head says of the card's evidence."""
-    found = facts(unverified_program(settings, scan=scan, limits=limits))
-    if not found:
-        return [f"Every field of the card {settings.card.id} that makes this program is documented or measured."]
-    return [f"Assumed or inferred in the card {settings.card.id}, and at work here:", *(f"- {fact}" for fact in found)]
-
-
-def _name(card_id: str) -> str:
-    """Return a name in C after a card: its letters and digits, one underscore for anything else."""
-    name = re.sub(r"[^A-Za-z0-9]+", "_", card_id).strip("_")
-    return name if name[:1].isalpha() else f"pid_{name}".rstrip("_")
-
-
-def _printed(program: Program, lang: str, name: str, notes: Sequence[str]) -> str:
-    if lang == "c":
-        from pidemu.backends.c import single
-
-        return single(program, name, notes)
-    from pidemu.backends.python import source
-
-    return source(program, notes)
-
-
-def _files(program: Program, lang: str, name: str, notes: Sequence[str]) -> dict[str, str]:
-    if lang == "c":
-        from pidemu.backends.c import header, source
-
-        return {f"{name}.h": header(program, name, notes), f"{name}.c": source(program, name, notes)}
-    return {f"{name}.py": _printed(program, lang, name, notes)}
 
 
 def _write(path: Path, text: str) -> None:

@@ -436,6 +436,24 @@ class Controller:
         wanted = {program: argument for argument, program in SIGNALS.items()}
         return [wanted[q.name] for q in self.program.inputs[4:]]
 
+    def listen(self, *signals: str) -> None:
+        """Make the program read signals, by the names of the arguments of `scan`, before they come.
+
+        Parameters
+        ----------
+        *signals : {"cascade", "track", "external_reset", "feedforward"}
+            Which signals.
+
+        Raises
+        ------
+        ScanError
+            There is no such signal, or the card has no use for it.
+        """
+        for name in signals:
+            if name not in SIGNALS:
+                raise ScanError(f"no signal '{name}'{suggest(name, SIGNALS)}; signals: {', '.join(SIGNALS)}")
+        self._read(dict.fromkeys(signals))
+
     def _read(self, extra: Mapping[str, object]) -> None:
         """Make the program read signals that it did not read so far."""
         for reason in self.settings.without_use_for(extra).values():

@@ -52,9 +52,11 @@ _TRIAL: Final[Mapping[str, Value]] = {"--setpoint": phrases.step, "--load": phra
 _OPTIONS: Final[Mapping[str, Mapping[str, Value]]] = {
     "show": {"--scan": phrases.time, "--pv-range": phrases.span, "--op-range": phrases.span},
     "code": {
-        "--lang": _choice("python", "c"), "--name": _choice("pid", "int", "x y"), "--scan": phrases.time, "--action": _ACTION,
-        "--limits": phrases.limits,
+        "--lang": _choice("python", "c", "js", "st", "plcopen"), "--name": _choice("pid", "int", "x y"), "--scan": phrases.time,
+        "--action": _ACTION, "--limits": phrases.limits, "--dialect": _choice("iec", "scl", "rockwell"),
+        "--signal": _choice("cascade", "track", "external_reset", "feedforward"),
     },
+    "vectors": {"--scan": phrases.time, "--action": _ACTION, "--limits": phrases.limits, "--seed": _choice("1", "2")},
     "run": {
         **_RUN, "--record": _file, "--scan": phrases.time, "--bias": _number, "--initial": _assignment, "-o": _output,
         "--engine": _ENGINE,
@@ -78,6 +80,7 @@ _OPTIONS: Final[Mapping[str, Mapping[str, Value]]] = {
 _SHARES: Final = {
     "show": 24,
     "code": 16,
+    "vectors": 4,
     "run": 28,
     "compare": 10,
     "simulate": 12,

@@ -1,0 +1,1 @@
+"""Scan programs as code in other languages."""
