@@ -69,7 +69,7 @@ _CODES: Final = (
          "convert (without it); skip"),
     Code("D-filter", "The source filters its measurement, and the target has nowhere to put the filter.", 6,
          "in front (a filter outside the block); leave out"),
-    Code("F-approx", "The conversion is not exact; how far it is off is stated.", 7),
+    Code("F-approx", "The conversion is not exact, or not at the scan intervals of both; how far it is off is stated.", 7),
     Code("F-structure", "Another share of the terms sees the setpoint: a setpoint step kicks the output otherwise.", 8),
     Code("F-limits", "The output limits are not 0 to 100 %; set them on the target, and the anti-windup limits, in its units.", 9),
     Code("F-unit-assumed", "No unit is stated: the card's own, or the mapping's, was taken.", 10),

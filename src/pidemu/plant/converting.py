@@ -249,6 +249,7 @@ def _note_conversion(reading: LoopReading, c: Conversion, rules: PlantRules, rul
         if allowed is not None and 100 * off > allowed and not _nearest(reading, decisions):
             text = f"{100 * off:.3g} % off in the loop band, and the rules allow {allowed:g} %"
             reading.find("D-refused", text, choices=(LoopChoice("nearest", "accept it"),), measure=off)
+    _note_unfiltered(reading, c)
     kick = c.certificate.setpoint_kick
     if not math.isclose(kick.source, kick.target, rel_tol=1e-3, abs_tol=1e-9):
         text = f"a setpoint step moves the output by {kick.target:.3g} at once, before it was {kick.source:.3g} (% per %)"
@@ -267,6 +268,22 @@ def _note_conversion(reading: LoopReading, c: Conversion, rules: PlantRules, rul
         reading.find("F-rounding", f"{dial.name}: {dial.exact:.6g} is rounded to {dial.rounded:g}")
     _note_ranges(reading, c)
     _note_times(reading, c)
+
+
+def _note_unfiltered(reading: LoopReading, c: Conversion) -> None:
+    """Note a derivative without a filter whose scan interval changes: equal as continuous laws, it is not so scan by scan."""
+    a, at_scan, kick = c.source.algorithm(), c.certificate.feedback_at_scan, c.certificate.setpoint_kick_at_scan
+    if c.verdict == "approximate" or not a.kd or a.Tf or a.measurement.filter is not None or c.scan is None or at_scan is None:
+        return
+    if c.scan[0] == c.scan[1] or c.settings.algorithm().Tf:
+        return
+    text = (
+        f"exact as a continuous law; nothing filters the derivative, so that with {c.scan[1]:g} s in place of {c.scan[0]:g} s the two are "
+        f"{100 * at_scan.loop_band.max_deviation:.3g} % apart in the loop band"
+    )
+    if kick is not None and not math.isclose(kick.source, kick.target, rel_tol=1e-3):
+        text += f", and a setpoint step moves the output by {kick.target:.3g} in the first scan, before it was {kick.source:.3g}"
+    reading.find("F-approx", text, measure=at_scan.loop_band.max_deviation)
 
 
 def _note_ranges(reading: LoopReading, c: Conversion) -> None:

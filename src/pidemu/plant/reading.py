@@ -80,7 +80,7 @@ def read_loop(loop: LoopLine, layout: ListLayout, words: PlantWords, decisions: 
         note_settings(reading, reading.settings)
         _ask_form(reading, words, decisions)
         ask_mode(reading, decisions)
-        _take_bias(reading, decisions)
+        take_bias(reading, decisions)
     pass_over(reading, decisions)
     return reading
 
@@ -174,7 +174,7 @@ def ask_mode(reading: LoopReading, decisions: Decisions) -> None:
     reading.find("D-mode", text, choices=choices)
 
 
-def _take_bias(reading: LoopReading, decisions: Decisions) -> None:
+def take_bias(reading: LoopReading, decisions: Decisions) -> None:
     """Take the bias that a person chose for a loop without integral action."""
     decided = decisions.answer(reading.tag, "D-no-integral")
     if decided is None or "D-no-integral" not in reading.codes:
