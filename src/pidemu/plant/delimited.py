@@ -11,6 +11,7 @@ from typing import Final
 
 from pidemu.errors import ListError
 from pidemu.files.kinds import other_encoding
+from pidemu.files.tables import untouched
 from pidemu.plant.cells import ListCell, ListLine, ListSheet, check_length
 
 _DELIMITERS: Final = ";\t,"
@@ -115,7 +116,7 @@ def _rows(text: str, delimiter: str, file: str, before: int) -> Iterator[tuple[i
     start = before + 1
     try:
         for row in reader:
-            yield start, [_untouched(cell) for cell in row]
+            yield start, [untouched(cell) for cell in row]
             start = before + reader.line_num + 1
     except csv.Error as error:
         raise ListError(f"{file}:{start}: {_cause(error)}") from None
@@ -127,8 +128,3 @@ def _cause(error: csv.Error) -> str:
     if "field larger" in str(error):
         return f"a cell of more than {csv.field_size_limit():,} characters; a quotation mark before it may not be closed"
     return f"not a line of a CSV file ({error}); save the list again as CSV"
-
-
-def _untouched(cell: str) -> str:
-    """Undo the apostrophe that keeps spreadsheets from computing a cell."""
-    return cell[1:] if len(cell) > 1 and cell[0] == "'" and cell[1] in "=+-@\t\r'" else cell

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 from pidemu.conversion.result import Conversion
 from pidemu.formatting import json_safe
 from pidemu.plant.codes import CODES, Level, RowClass, class_of
 from pidemu.plant.converting import LoopConversion
-from pidemu.plant.reading_model import Finding, LoopReading
-
-_KEPT: Final = ("gain", "integral", "derivative")
-
+from pidemu.plant.reading_model import Decision, Finding, LoopReading
 
 @dataclass(frozen=True)
 class RetrofitRow:
@@ -80,7 +77,7 @@ class RetrofitRow:
             "class": self.row_class,
             "codes": r.codes,
             "findings": [_finding(f, self.levels) for f in r.findings],
-            "decided": [d.__dict__ if hasattr(d, "__dict__") else _decision(d) for d in r.decisions],
+            "decided": [_decision(d) for d in r.decisions],
             "source": _source(r),
             "settings": self.settings,
             "options": self.options,
@@ -132,7 +129,7 @@ def _finding(f: Finding, levels: Mapping[str, Level]) -> dict[str, Any]:
     }
 
 
-def _decision(d: Any) -> dict[str, str]:
+def _decision(d: Decision) -> dict[str, str]:
     return {name: getattr(d, name) for name in ("tag", "rule", "answer", "name", "date", "reason", "place")}
 
 
