@@ -49,7 +49,7 @@ _CODES: Final = (
     Code("E-range", "A range whose low end is not below its high end, or a value outside the card's range.", 3),
     Code("E-bits", "The named bits of a Logix PID tag contradict its control word CTL.", 3),
     Code("D-refused", "The target cannot do what the source does; the nearest settings and their cost are stated.", 1, "nearest; skip"),
-    Code("D-duplicate", "Another line has the same tag and other contents.", 2, "this (for the line that counts); skip"),
+    Code("D-duplicate", "Another line has the same tag and other contents.", 2, "the line that counts, such as Sheet1:12, or the file; skip"),
     Code("D-unit", "A unit can be read in two ways, or cell and unit column contradict each other.", 4, "the unit, such as min/repeat"),
     Code("D-form", "The form is not stated and it matters, because derivative is used.", 4, "the choice, such as ideal"),
     Code("D-equation", "The equation is not stated, and the units of the settings hang on it.", 4, "the choice, such as independent"),

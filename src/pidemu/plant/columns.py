@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from pidemu.plant.codes import CODES
 from pidemu.plant.rows import RetrofitRow, level_of
+from pidemu.plant.settings_units import shown_unit
 from pidemu.units import Role
 
 _PARTS: Final = (("P", Role.GAIN), ("I", Role.INTEGRAL), ("D", Role.DERIVATIVE))
@@ -82,7 +83,7 @@ def converted_values(row: RetrofitRow, number: int) -> dict[str, Any]:
             origin = r.origins.get(dial.name)
             found[f"source {letter}"] = dial.value
             found[f"source {letter} unit"] = dial.unit
-            found[f"source {letter} as found"] = "" if origin is None else f"{origin.cell} {origin.unit} ({origin.unit_from})"
+            found[f"source {letter} as found"] = "" if origin is None else f"{origin.cell} {shown_unit(origin.unit)} ({origin.unit_from})"
     return found
 
 

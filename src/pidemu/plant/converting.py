@@ -74,9 +74,11 @@ def convert_loop(reading: LoopReading, rules: PlantRules, decisions: Decisions) 
         found = _converted(source, rules.target, ruled, {**asked, "options": options, "given": given}, _nearest(reading, decisions))
     except QuestionError as error:
         for question in error.questions:
-            choices = tuple(LoopChoice(a.value, a.says) for a in question.readings)
             code = _KINDS.get(question.kind) or _code_of_option(source, question.about)
-            reading.find(code, question.text, choices=choices)
+            text, _, _ = question.text.partition("; add for example")
+            ranged = question.kind == "range"
+            choices = tuple(LoopChoice(a.value, "" if ranged else a.says) for a in question.readings)
+            reading.find(code, text, choices=choices)
         return None
     except ConversionRefusedError as error:
         _note_refusal(reading, error)

@@ -9,8 +9,7 @@ from typing import Final
 import yaml
 
 from pidemu.card.library import cards
-from pidemu.errors import suggest
-from pidemu.plant.fields import Field
+from pidemu.plant.fields import Field, folded
 from pidemu.plant.layout import ListLayout, find_layout
 from pidemu.plant.lines import LoopLine, split_sheet
 from pidemu.plant.loop_cells import LoopCells
@@ -99,9 +98,31 @@ def _systems(cells: Sequence[LoopCells], words: PlantWords) -> Iterator[str]:
         if card_id:
             yield f"  {card_id}: [{', '.join(_text(word) for word, _ in names)}]      # {', '.join(f'{n} loops' for _, n in names)}"
     for word, n in found.get("", []):
-        yield f"  # VENDOR/BLOCK: [{_text(word)}]      # {n} loops{suggest(word.casefold(), cards())}"
+        guess = guessed_card(word)
+        told = "; a guess, take the # away if it is right" if guess else ""
+        yield f"  # {guess or 'VENDOR/BLOCK'}: [{_text(word)}]      # {n} loops{told}"
     if set(found) <= {""}:
         yield "  {}"
+
+
+def guessed_card(word: str) -> str:
+    """Return the card that a system's name may mean: the block or product whose name stands in it; empty where there is none.
+
+    Examples
+    --------
+    >>> guessed_card("TDC3000 RegPV/Ctl"), guessed_card("CLX PIDE"), guessed_card("Unknown")
+    ('honeywell/tdc3000', 'allen-bradley/pide', '')
+    """
+    plain = folded(word).replace("/", "")
+    found = []
+    for card_id in cards():
+        vendor, _, block = card_id.partition("/")
+        name = folded(block) if vendor != "generic" else ""
+        score = len(name) if len(name) > 2 and name in plain else 0
+        score += len(folded(vendor)) if folded(vendor) in plain else 3 if score and folded(vendor)[:3] in plain else 0
+        if score > 2:
+            found.append((-score, card_id))
+    return min(found)[1] if found else ""
 
 
 def _action_words(cells: Sequence[LoopCells], words: PlantWords) -> Iterator[str]:

@@ -18,7 +18,7 @@ from pidemu.plant.lines import LoopLine, SkippedLine, skipped_sheet, split_sheet
 from pidemu.plant.mapping import PlantWords, read_mapping
 from pidemu.plant.outcomes import with_outcomes
 from pidemu.plant.reading import ask_structures, read_loop
-from pidemu.plant.reading_model import LoopReading
+from pidemu.plant.reading_model import LoopChoice, LoopReading
 from pidemu.plant.rows import RetrofitRow, level_of, row_of
 from pidemu.plant.rules import PlantRules, read_rules
 from pidemu.plant.sources import LoopSource, read_sources
@@ -253,6 +253,10 @@ def convert_lists(
         rows.append(_row(reading, again, rules, decisions, id(reading) in dropped))
         if progress is not None:
             progress(number, len(listed.loops))
+    used = {(d.tag, d.rule) for reading in readings for d in reading.decisions}
+    for key, decision in decisions.given.items():
+        if key not in used:
+            listed.notes.append(f"{decision.place}: {key[0]} {key[1]} was not asked, or '{decision.answer}' is not an answer to it")
     return RetrofitResult(rows, _summary(rows, listed))
 
 
@@ -294,15 +298,23 @@ def _note_duplicates(readings: Sequence[LoopReading], decisions: Decisions) -> s
                 other.find("F-repeat", f"the same as {_where(same[0])}; it counts once")
             continue
         decided = decisions.answer(same[0].tag, "D-duplicate")
-        chosen = [r for r in same if decided is not None and decided.answer.strip() in (str(r.line), f"{r.sheet}:{r.line}")]
+        chosen = [r for r in same if decided is not None and decided.answer.strip() in _names(r)]
         if decided is not None and len(chosen) == 1:
             note_decision(chosen[0], decided)
             dropped |= {id(r) for r in same if r is not chosen[0]}
             continue
         for reading in same:
             others = ", ".join(_where(r) for r in same if r is not reading)
-            reading.find("D-duplicate", f"{reading.tag} stands with other contents in {others}. Which counts?", f"line {reading.line}")
+            choices = tuple(LoopChoice(_names(r)[0], _where(r)) for r in same)
+            text = f"{reading.tag} stands with other contents in {others}. Which counts?"
+            reading.find("D-duplicate", text, f"line {reading.line}", choices=choices)
     return dropped
+
+
+def _names(reading: LoopReading) -> tuple[str, ...]:
+    """Return what names a line in an answer."""
+    line = str(reading.line)
+    return (f"{reading.sheet}:{line}" if reading.sheet else line, line, f"{reading.file}:{line}")
 
 
 def _where(reading: LoopReading) -> str:

@@ -18,7 +18,7 @@ from pidemu.plant.loop_cells import LoopCells
 from pidemu.plant.mapping import PlantWords
 from pidemu.plant.numbers import CellError, CellNumber, cell_number
 from pidemu.plant.reading_model import LoopChoice, LoopReading, ValueOrigin
-from pidemu.plant.settings_units import UnitReading, ask_unit, is_doubtful_time, is_other, settled_unit, stated_unit
+from pidemu.plant.settings_units import UnitReading, ask_unit, is_doubtful_time, is_other, settled_unit, shown_unit, stated_unit
 from pidemu.plant.source_options import dial_for, open_equations, unit_choices
 from pidemu.plant.unit_words import Setting, unit_of
 from pidemu.settings.ranges import SignalRange
@@ -26,6 +26,11 @@ from pidemu.settings.settings import Settings, limits, off_values
 from pidemu.units import Dimension, Role, check_unit, is_reciprocal, parse_unit
 
 _ROLES: Final[dict[Setting, Role]] = {"gain": Role.GAIN, "integral": Role.INTEGRAL, "derivative": Role.DERIVATIVE}
+_OTHER_READING: Final = {
+    "%": "1", "%/%": "%", "min": "s", "s": "min", "min/repeat": "repeat/min", "s/repeat": "min/repeat", "repeat/min": "min/repeat",
+    "1/min": "1/s", "1/s": "1/min",
+}  # fmt: skip
+"""What else a bare number could be."""
 _OFF: Final = ("off", "aus", "none", "-", "--", "inf", "infinite", "∞", "nil")
 _TIMES: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 _PER_REPEAT: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
@@ -234,6 +239,10 @@ def _dial_value(
     except UnitError:
         reading.find("E-unit", f"'{unit.unit}' is not a unit of {dial}", cell.place, cell.text)
         return None
+    if unit.source == "card" and number and words.written.blank_units == "ask":
+        other = _OTHER_READING.get(own.name, own.name)
+        ask_unit(reading, setting, found.number, "no unit is stated", cell, list(dict.fromkeys([own.name, other])))
+        return None
     if unit.source != "decision" and _is_doubtful(reading, variant, setting, dial, found, unit.unit):
         return None
     if setting == "gain" and number == 0 and is_reciprocal(role, written):
@@ -243,7 +252,7 @@ def _dial_value(
     if unit.source == "card" and number:
         reading.find("F-unit-assumed", f"{dial}: no unit is stated, {own.name} was taken, the card's own", cell.place, cell.text)
     elif is_other(unit.unit, own) and number:
-        reading.find("F-unit-other", f"{dial} is stated in {unit.unit}, the dial is in {own.name}", cell.place, cell.text)
+        reading.find("F-unit-other", f"{dial} is stated in {shown_unit(unit.unit)}, the dial is in {own.name}", cell.place, cell.text)
     if not number or unit.unit == own.name or (unit.unit == "1" and own.dimension in (Dimension.RATIO, Dimension.OP_PER_PV)):
         return number
     text = "s/repeat" if unit.unit == "s" and setting == "integral" and own.dimension is Dimension.REPEATS_PER_TIME else unit.unit

@@ -75,7 +75,7 @@ def _outcome(
 def _answer(asked: Finding, choice: LoopChoice) -> str:
     """Return an answer as the decisions file holds it; of a unit it says of which setting."""
     setting = asked.text.partition(":")[0]
-    return f"{setting}: {choice.answer}" if asked.code == "D-unit" else choice.answer
+    return f"{setting}: {choice.answer}" if asked.code == "D-unit" and ":" not in choice.answer else choice.answer
 
 
 def _ratio(conversions: list[Conversion]) -> float:

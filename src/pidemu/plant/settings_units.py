@@ -184,8 +184,14 @@ def _same_kind(one: Unit, other: Unit) -> bool:
 
 
 def _ask(reading: LoopReading, setting: Setting, number: CellNumber, text: str, cell: ListCell, units: list[str]) -> None:
-    choices = tuple(LoopChoice(unit, f"{number.value:g} is {_SAYS.get(unit, f'{_a(setting)} in {unit}')}") for unit in units)
+    named = "derivative: " if setting == "derivative" else ""  # a time alone would be that of the integral
+    choices = tuple(LoopChoice(f"{named}{unit}", f"{number.value:g} is {_SAYS.get(unit, f'{_a(setting)} in {unit}')}") for unit in units)
     reading.find("D-unit", f"{setting}: {text}. Which is it?", cell.place, cell.text, choices=choices)
+
+
+def shown_unit(unit: str) -> str:
+    """Return a unit as it is told: a plain ratio is a gain."""
+    return "gain" if unit == "1" else unit
 
 
 def ask_unit(reading: LoopReading, setting: Setting, number: CellNumber, text: str, cell: ListCell, units: list[str]) -> None:

@@ -56,13 +56,28 @@ def readings_of_exports(
     for same in found.values():
         same.sort(key=lambda s: not s[0].has_tasks)  # the one that says what executes it
         export, loop = same[0]
+        chosen = _chosen(same, several, decisions)
+        if chosen is not None:
+            export, loop = chosen
         known = {path for other in exports if other.controller == export.controller for path in (x.path for x in other.loops)}
-        others = [(e, x) for e, x in same[1:] if _contents(x) != _contents(loop)]
+        others = [(e, x) for e, x in same if _contents(x) != _contents(loop)] if chosen is None else []
 
         def again(given: Decisions, at: Any = (export, loop, others, known, several, len(same))) -> LoopReading:
             return _reading(*at, given)
 
         yield again(decisions), again
+
+
+def _chosen(same: Sequence[tuple[L5xExport, L5xLoop]], several: bool, decisions: Decisions) -> tuple[L5xExport, L5xLoop] | None:
+    """Return the export that a person decided for; ``None`` where nobody did."""
+    decided = decisions.answer(_tag(*same[0], several), "D-duplicate")
+    return None if decided is None else next((s for s in same if s[0].file == decided.answer.strip()), None)
+
+
+def _tag(export: L5xExport, loop: L5xLoop, several: bool) -> str:
+    """Return the tag of a loop: its path, with the scope where that is a program, and the controller where there are several."""
+    scope = "" if loop.scope == CONTROLLER else f"{loop.scope}/"
+    return f"{export.controller}:{scope}{loop.path}" if several else f"{scope}{loop.path}"
 
 
 def _contents(loop: L5xLoop) -> tuple[Any, ...]:
@@ -79,8 +94,7 @@ def _reading(
     times: int,
     decisions: Decisions,
 ) -> LoopReading:
-    scope = "" if loop.scope == CONTROLLER else f"{loop.scope}/"
-    tag = f"{export.controller}:{scope}{loop.path}" if several else f"{scope}{loop.path}"
+    tag = _tag(export, loop, several)
     reading = LoopReading(export.file, loop.scope, loop.line, tag, loop.description, export.controller, loop.block)
     reading.contents = _contents(loop)
     reading.facts = {
@@ -98,6 +112,8 @@ def _reading(
     place = f"line {loop.line}"
     if others:
         _note_difference(reading, export, loop, others, place)
+    elif times > 1 and (decided := decisions.answer(tag, "D-duplicate")):
+        note_decision(reading, decided)
     elif times > 1:
         reading.find("F-repeat", f"stands in {times} exports with the same contents; it counts once", place)
     if loop.values.fault:
@@ -116,9 +132,9 @@ def _note_difference(
         what = ", ".join(f"{n} {loop.values.settings[n]:g} and {found.values.settings.get(n)}" for n in names if loop.values.settings[n] is not None)
         text = (
             f"{loop.path} has other contents in {export.file} of {export.date} and in {other.file} of {other.date}"
-            f"{f': {what}' if what else ''}. Which counts? Leave out the export that does not"
+            f"{f': {what}' if what else ''}. Which counts?"
         )
-        reading.find("D-duplicate", text, place)
+        reading.find("D-duplicate", text, place, choices=(LoopChoice(export.file, export.date), LoopChoice(other.file, other.date)))
 
 
 def _read(reading: LoopReading, loop: L5xLoop, decisions: Decisions, place: str, known: set[str]) -> None:
