@@ -19,6 +19,7 @@ from pidemu.plant.loop_settings import times_of
 from pidemu.plant.loop_signals import COUNTS
 from pidemu.plant.reading_model import LoopChoice, LoopReading
 from pidemu.plant.rules import EXACT_ELSE, FREE, MATCH_SOURCE, LoopRules, PlantRules, option_text
+from pidemu.settings.quantities import measure_of
 from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings
 from pidemu.units import FULL, from_canonical, parse_unit
@@ -137,7 +138,7 @@ def as_ranged(reading: LoopReading) -> None:
         own = SignalRange(old.low, old.high, COUNTS)
         reading.settings = settings.changed({"pv_range": own})
         return
-    unit = old.unit or "eu"
+    unit = old.unit if measure_of(old.unit).is_quantity else "eu"  # a unit that could be a raw scale is not meant as one
     reading.settings = settings.changed({"pv_range": SignalRange(old.low, old.high, unit)})
     reading.new_range = SignalRange(new.low, new.high, unit)
 
