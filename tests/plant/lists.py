@@ -13,7 +13,8 @@ from pidemu.plant.rows import RetrofitRow
 HEADER: Final = {
     "Tag": "TIC-1", "Service": "Reactor", "System": "fisher/provox", "P": "2", "P unit": "gain", "I": "4", "I unit": "rep/min",
     "D": "", "D unit": "", "PV filter [s]": "", "Form": "", "Equation": "", "LRV": "0", "URV": "200", "EU": "degC", "New LRV": "",
-    "New URV": "", "Re-ranged?": "", "OP lo": "0", "OP hi": "100", "Action": "reverse", "Mode": "AUTO", "Update [s]": "", "Scan [s]": "1",
+    "New URV": "", "Re-ranged?": "", "OP lo": "0", "OP hi": "100", "Action": "reverse", "Mode": "AUTO", "Update [s]": "",
+    "Scan [s]": "1",
     "Options": "", "Remarks": "",
 }  # fmt: skip
 TDC: Final = {"System": "honeywell/tdc3000", "I": "5", "I unit": "min/rep", "Form": "ideal", "Equation": "EQA"}

@@ -241,7 +241,8 @@ def test_another_range_multiplies_the_gain_and_another_scale_does_not(tmp_path: 
 
 def test_every_code_has_a_test_and_an_explanation() -> None:
     elsewhere = {
-        "E-bits", "D-structure", "D-duplicate", "D-filter", "F-series-limit", "F-hidden-row", "F-rounding", "F-repeat", "F-interval",
+        "E-bits", "D-structure", "D-duplicate", "D-filter", "F-series-limit", "F-hidden-row", "F-rounding", "F-repeat",
+        "F-interval",
         "F-decided", "F-lowered",
     }  # fmt: skip
     assert {code for code, _ in (*ERRORS, *DECISIONS, *FLAGS)} | elsewhere == set(CODES)

@@ -36,13 +36,16 @@ def test_a_loop_is_as_expected(want: dict[str, Any], plant: dict[tuple[str, str]
     got = plant[want["scope"], want["path"]]
     values = got.values
     assert values.settings == pytest.approx(want["settings"], abs=1e-6) if None not in want["settings"].values() else True
-    assert [name for name, value in values.settings.items() if value is None] == [n for n, v in want["settings"].items() if v is None]
+    assert [name for name, value in values.settings.items() if value is None] == [
+        n for n, v in want["settings"].items() if v is None
+    ]
     assert {
         "block": got.block, "card": got.card, "options": values.options, "pv_range": list(values.pv_range), "action": values.action,
         "interval_s": got.interval_s, "executed": got.executed, "outcome": got.outcome, "flags": sorted(got.flags),
         "values_from": got.values_from,
     } == {
-        **{n: want[n] for n in ("block", "card", "options", "pv_range", "action", "interval_s", "executed", "outcome", "values_from")},
+        **{n: want[n] for n in ("block", "card", "options", "pv_range", "action", "interval_s", "executed", "outcome",
+        "values_from")},
         "flags": sorted(want["flags"]),
     }  # fmt: skip
     assert got.aliases == want.get("aliases", [])
@@ -76,7 +79,11 @@ def test_a_loop_of_two_exports_counts_once_and_other_contents_are_a_decision(tmp
     assert codes["TIC_101"] == ["F-repeat"]
     assert codes["Program:Feed/FIC_102"] == ["D-duplicate", "D-update"]
     text = next(f.text for row in rows for f in row.reading.findings if f.code == "D-duplicate")
-    for said in ("plant_a.L5X of Mon Mar 02 08:15:00 2026", "plant_a_feed_program.L5X of Tue Jan 06 14:02:11 2026", "KP 0.35 and 0.5"):
+    for said in (
+        "plant_a.L5X of Mon Mar 02 08:15:00 2026",
+        "plant_a_feed_program.L5X of Tue Jan 06 14:02:11 2026",
+        "KP 0.35 and 0.5",
+    ):
         assert said in text
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(
@@ -148,8 +155,17 @@ def controller(body: str) -> bytes:
     return f'<RSLogix5000Content TargetType="Controller"><Controller Name="C">{body}</Controller></RSLogix5000Content>'.encode()
 
 
+def user_type(member: str) -> str:
+    return f'<DataTypes><DataType Name="T"><Members><Member Name="X" {member}/></Members></DataType></DataTypes>'
+
+
+def ladder(name: str, text: str) -> str:
+    rung = f'<Rung Number="0"><Text>{text}</Text></Rung>'
+    return f'<Routines><Routine Name="{name}" Type="RLL"><RLLContent>{rung}</RLLContent></Routine></Routines>'
+
+
 def test_an_array_of_a_billion_that_holds_no_loops_is_not_gone_through() -> None:
-    types = '<DataTypes><DataType Name="T"><Members><Member Name="X" DataType="REAL" Dimension="999999999"/></Members></DataType></DataTypes>'
+    types = user_type('DataType="REAL" Dimension="999999999"')
     tags = '<Tags><Tag Name="A" DataType="T" Dimensions="999999999"/></Tags>'
     assert read_l5x(controller(types + tags), "x.L5X").loops == []
 
@@ -160,13 +176,14 @@ def test_an_array_of_more_loops_than_a_plant_has_is_refused() -> None:
 
 
 def test_types_aliases_and_instructions_that_lead_to_themselves_end() -> None:
-    types = '<DataTypes><DataType Name="T"><Members><Member Name="X" DataType="T"/></Members></DataType></DataTypes>'
-    logic = '<Routines><Routine Name="Logic" Type="RLL"><RLLContent><Rung Number="0"><Text>L(Self);</Text></Rung></RLLContent></Routine></Routines>'
     local = '<LocalTags><LocalTag Name="Self" DataType="L"/></LocalTags>'
-    aoi = f'<AddOnInstructionDefinitions><AddOnInstructionDefinition Name="L">{local}{logic}</AddOnInstructionDefinition></AddOnInstructionDefinitions>'
-    tags = '<Tags><Tag Name="A" TagType="Alias" AliasFor="B"/><Tag Name="B" TagType="Alias" AliasFor="A"/><Tag Name="I" DataType="L"/><Tag Name="U" DataType="T"/></Tags>'
-    code = '<Programs><Program Name="P" MainRoutineName="M"><Routines><Routine Name="M" Type="RLL"><RLLContent><Rung Number="0"><Text>PID(A,0,0,0,0,0,0)L(I);</Text></Rung></RLLContent></Routine></Routines></Program></Programs>'
-    assert read_l5x(controller(types + aoi + tags + code), "x.L5X").loops == []
+    definition = f'<AddOnInstructionDefinition Name="L">{local}{ladder("Logic", "L(Self);")}</AddOnInstructionDefinition>'
+    aoi = f"<AddOnInstructionDefinitions>{definition}</AddOnInstructionDefinitions>"
+    aliases = "".join(f'<Tag Name="{a}" TagType="Alias" AliasFor="{b}"/>' for a, b in ("AB", "BA"))
+    tags = f'<Tags>{aliases}<Tag Name="I" DataType="L"/><Tag Name="U" DataType="T"/></Tags>'
+    logic = ladder("M", "PID(A,0,0,0,0,0,0)L(I);")
+    code = f'<Programs><Program Name="P" MainRoutineName="M">{logic}</Program></Programs>'
+    assert read_l5x(controller(user_type('DataType="T"') + aoi + tags + code), "x.L5X").loops == []
 
 
 @pytest.mark.parametrize("text", ["[1,[2", "[1]]", "1,2", "[[[[[[" * 40, ""])

@@ -70,7 +70,8 @@ def test_a_conversion_is_that_of_convert_row_by_row() -> None:
         request = c.request
         again = pidemu.convert(
             c.source, request_card(c), options=request.options, given=request.given, scan=c.scan, mode=request.mode,
-            action=request.action, match=request.match, to_pv_range=request.to_pv_range, limits=request.limits, digits=request.digits,
+            action=request.action, match=request.match, to_pv_range=request.to_pv_range, limits=request.limits,
+            digits=request.digits,
             tag=request.tag, emulate=False,
         )  # fmt: skip
         assert {n: v.value for n, v in again.settings.items()} == {n: v.value for n, v in c.settings.items()}
@@ -88,7 +89,9 @@ def test_naive_readings_differ() -> None:
     """Taken at their word, by units that the list does not state, many of the rows that stop would be converted wrongly."""
     stopping = [row for row in expected_rows() if row["class"] != "converted"]
     rows, _ = small("csv", "deltav")
-    with_two_readings = [r for r in rows for f in r.reading.findings if f.code in ("D-unit", "D-equation", "D-form") and f.measure > 1.01]
+    with_two_readings = [
+        r for r in rows for f in r.reading.findings if f.code in ("D-unit", "D-equation", "D-form") and f.measure > 1.01
+    ]
     assert len(stopping) == 16
     assert {r.reading.tag for r in with_two_readings} == {"FIC-7017", "TIC-7019", "FIC-7044", "LIC-7060", "FIC-7074"}
 
@@ -117,4 +120,6 @@ def test_decisions_convert_what_stopped(tmp_path: Path) -> None:
     assert settings["FIC-7074"]["GAIN"] == 4
     decided = next(row for row in rows if row.reading.tag == "FIC-7017")
     assert [(d.name, d.answer) for d in decided.reading.decisions] == [("M. Roth", "repeat/min")]
-    assert [note for note in summary.notes if "FIC-1 " in note] == [f"{file}:15: FIC-1 D-unit was not asked, or '%' is not an answer to it"]
+    assert [note for note in summary.notes if "FIC-1 " in note] == [
+        f"{file}:15: FIC-1 D-unit was not asked, or '%' is not an answer to it"
+    ]

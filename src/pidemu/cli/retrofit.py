@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -18,6 +19,7 @@ from pidemu.files.tables import counted, write_table
 from pidemu.files.writing import beside
 
 if TYPE_CHECKING:
+    from pidemu.plant.decisions import Decisions
     from pidemu.plant.job import RetrofitResult
     from pidemu.plant.mapping import PlantWords
     from pidemu.plant.rules import PlantRules
@@ -38,11 +40,19 @@ _SHOWN: Final = 10
 @click.argument("lists", nargs=-1, metavar="LIST...")
 @click.option("--to", "target", metavar="CARD", help="The card to convert to; by default that of the rules.")
 @click.option("--map", "mapping", metavar="FILE.yaml", help="What the words of the lists mean; --draft-map writes one.")
-@click.option("--rules", metavar="FILE.yaml", help="The plant's rules: options of the target, digits, scan classes, what stops a loop.")
+@click.option(
+    "--rules", metavar="FILE.yaml", help="The plant's rules: options of the target, digits, scan classes, what stops a loop."
+)
 @click.option("--decisions", metavar="FILE.csv", help="What people decided.")
-@click.option("--out", "folder", type=OutputArgument("folder"), metavar="FOLDER", help="Write everything there: CSV, JSON, workbook, report.")
-@click.option("--workbook/--no-workbook", "workbook", default=None, help="Write the workbook, too; by default where xlsxwriter is installed.")
-@click.option("--draft-map", "draft", type=OutputArgument(), metavar="FILE.yaml", help="Write a mapping that explains itself, and stop.")
+@click.option(
+    "--out", "folder", type=OutputArgument("folder"), metavar="FOLDER", help="Write everything there: CSV, JSON, workbook, report."
+)
+@click.option(
+    "--workbook/--no-workbook", "workbook", default=None, help="Write the workbook, too; by default where xlsxwriter is installed."
+)
+@click.option(
+    "--draft-map", "draft", type=OutputArgument(), metavar="FILE.yaml", help="Write a mapping that explains itself, and stop."
+)
 @click.option("--list-rules", is_flag=True, help="List all that stops a loop or flags it, and how it is answered.")
 @json_option
 def command(
@@ -59,7 +69,8 @@ def command(
 ) -> None:
     """Convert the loops of LIST..., a plant's loop lists as they are: xlsx, xls, ods, CSV, L5X.
 
-    What is doubtful stops its loop and no other. Exit status 0 where all loops are converted, 1 where some wait or cannot be read, 2
+    What is doubtful stops its loop and no other. Exit status 0 where all loops are converted, 1 where some wait or cannot be
+    read, 2
     where the job cannot run.
     """
     from pidemu.plant.decisions import Decisions, read_decisions
@@ -97,11 +108,11 @@ def command(
         raise SystemExit(1)
 
 
-def _run(lists: tuple[str, ...], rules: PlantRules, words: PlantWords, decided: Any) -> RetrofitResult:
+def _run(lists: tuple[str, ...], rules: PlantRules, words: PlantWords, decided: Decisions) -> RetrofitResult:
     """Read and convert; on a terminal the progress is shown."""
     from pidemu.plant.job import retrofit
 
-    if not click.get_text_stream("stderr").isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         return retrofit(lists, rules=rules, mapping=words, decisions=decided)
     started = time.monotonic()
 
@@ -154,7 +165,9 @@ def _prepared(folder: str, workbook: bool | None, read: list[str | Path]) -> dic
     return paths
 
 
-def _write(paths: dict[str, str], result: RetrofitResult, document: dict[str, Any], rules: PlantRules, read: list[str | Path]) -> None:
+def _write(
+    paths: dict[str, str], result: RetrofitResult, document: dict[str, Any], rules: PlantRules, read: list[str | Path]
+) -> None:
     from pidemu.plant.columns import DECIDE, ERRORS, SKIPPED, converted_columns, converted_values, decision_rows, error_rows
     from pidemu.plant.exceptions import exception_report
     from pidemu.plant.workbook_file import write_workbook

@@ -12,7 +12,8 @@ from pidemu.units import Role
 
 _PARTS: Final = (("P", Role.GAIN), ("I", Role.INTEGRAL), ("D", Role.DERIVATIVE))
 DECIDE: Final = (
-    "tag", "rule", "answer", "name", "date", "reason", "question", "reading A", "result A", "reading B", "result B", "answers", "service",
+    "tag", "rule", "answer", "name", "date", "reason", "question", "reading A", "result A", "reading B", "result B", "answers",
+    "service",
     "file", "sheet", "row", "cell",
 )  # fmt: skip
 """Columns of the decisions; the first six are those of the decisions file, so that it can be filled in and read back."""
@@ -30,8 +31,10 @@ def converted_columns(rows: Sequence[RetrofitRow]) -> list[str]:
     targets = list(dict.fromkeys(name for row in rows for name in row.settings))
     source = [f"source {letter}{what}" for letter, _ in _PARTS for what in ("", " as found", " unit")]
     return [
-        "tag", "service", "area", "source card", "source options", *source, "PV filter [s]", *targets, "pasted by units alone", "verdict",
-        "in words", "loop-band deviation [%]", "kick before", "kick after", "gain factor", "PV range", "new PV range", "action", "scan [s]",
+        "tag", "service", "area", "source card", "source options", *source, "PV filter [s]", *targets, "pasted by units alone",
+        "verdict",
+        "in words", "loop-band deviation [%]", "kick before", "kick after", "gain factor", "PV range", "new PV range",
+        "action", "scan [s]",
         "flags", "remarks", "decided by", "file", "sheet", "row", "number",
     ]  # fmt: skip
 
@@ -71,7 +74,9 @@ def converted_values(row: RetrofitRow, number: int) -> dict[str, Any]:
         "scan [s]": None if c.scan is None else c.scan[1],
         "flags": ", ".join(r.codes),
         "remarks": "; ".join(f.text for f in r.findings),
-        "decided by": "; ".join(f"{d.rule}: {d.answer} ({', '.join(x for x in (d.name, d.date, d.reason) if x)})" for d in r.decisions),
+        "decided by": "; ".join(
+            f"{d.rule}: {d.answer} ({', '.join(x for x in (d.name, d.date, d.reason) if x)})" for d in r.decisions
+        ),
         "file": r.file,
         "sheet": r.sheet,
         "row": r.line,
@@ -83,13 +88,21 @@ def converted_values(row: RetrofitRow, number: int) -> dict[str, Any]:
             origin = r.origins.get(dial.name)
             found[f"source {letter}"] = dial.value
             found[f"source {letter} unit"] = dial.unit
-            found[f"source {letter} as found"] = "" if origin is None else f"{origin.cell} {shown_unit(origin.unit)} ({origin.unit_from})"
+            found[f"source {letter} as found"] = (
+                "" if origin is None else f"{origin.cell} {shown_unit(origin.unit)} ({origin.unit_from})"
+            )
     return found
 
 
 def decision_rows(rows: Sequence[RetrofitRow]) -> Iterator[dict[str, Any]]:
     """Yield a line for everything that a person has to decide, in the order of risk."""
-    open_ones = [(f, row) for row in rows if row.row_class == "decision" for f in row.reading.findings if level_of(f, row.levels) == "decision"]
+    open_ones = [
+        (f, row)
+        for row in rows
+        if row.row_class == "decision"
+        for f in row.reading.findings
+        if level_of(f, row.levels) == "decision"
+    ]
     for finding, row in sorted(open_ones, key=lambda x: (CODES[x[0].code].risk, -x[0].measure, x[1].reading.tag)):
         r = row.reading
         found: dict[str, Any] = {

@@ -24,7 +24,14 @@ from pidemu.settings.ranges import SignalRange
 from pidemu.settings.settings import Settings
 from pidemu.units import FULL, from_canonical, parse_unit
 
-_KINDS: Final = {"unit": "D-unit", "range": "D-range", "scale": "D-rerange", "action": "D-action", "mode": "D-mode", "input": "E-missing"}
+_KINDS: Final = {
+    "unit": "D-unit",
+    "range": "D-range",
+    "scale": "D-rerange",
+    "action": "D-action",
+    "mode": "D-mode",
+    "input": "E-missing",
+}
 _TERMS: Final = ("proportional", "integral", "derivative")
 _MOVED: Final = 1e-3
 """Share of a setting that rounding may move it by without a word."""
@@ -120,7 +127,7 @@ def _asked(reading: LoopReading, rules: PlantRules, ruled: LoopRules, source: Se
         asked["scan"] = (reading.computes_with or reading.scan, goal or reading.scan)
         if reading.computes_with is not None:
             asked["runs_every"] = (reading.scan, goal or reading.scan)
-    if reading.limits is not None and -10 <= reading.limits[0] and reading.limits[1] <= 110 and reading.limits != (0, 100):
+    if reading.limits is not None and reading.limits[0] >= -10 and reading.limits[1] <= 110 and reading.limits != (0, 100):
         asked["limits"] = reading.limits
     if depends_on_mode(source) and reading.mode in ("auto", "cascade"):
         asked["mode"] = reading.mode
@@ -281,7 +288,8 @@ def _note_unfiltered(reading: LoopReading, c: Conversion) -> None:
     if c.scan[0] == c.scan[1] or c.settings.algorithm().Tf:
         return
     text = (
-        f"exact as a continuous law; nothing filters the derivative, so that with {c.scan[1]:g} s in place of {c.scan[0]:g} s the two are "
+        f"exact as a continuous law; nothing filters the derivative, so that with {c.scan[1]:g} s in place of {c.scan[0]:g} "
+        f"s the two are "
         f"{100 * at_scan.loop_band.max_deviation:.3g} % apart in the loop band"
     )
     if kick is not None and not math.isclose(kick.source, kick.target, rel_tol=1e-3):
@@ -299,7 +307,8 @@ def _note_ranges(reading: LoopReading, c: Conversion) -> None:
     expected = new.span / old.span
     reading.find("F-rerange", f"{old} becomes {new}: the gain is multiplied by {expected:.6g}", measure=abs(math.log(expected)))
     if not math.isclose(abs(c.factor), expected, rel_tol=1e-9):
-        text = f"another range multiplies the gain by {expected:.6g}, and the conversion has {abs(c.factor):.6g}; state the unit of both"
+        text = f"another range multiplies the gain by {expected:.6g}, and the conversion has {abs(c.factor):.6g}; state the "
+        "unit of both"
         reading.find("D-rerange", text)
 
 

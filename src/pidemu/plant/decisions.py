@@ -74,10 +74,13 @@ def read_decisions(path: str | Path) -> Decisions:
             code = code_named(texts["rule"]).name
         except ListError as error:
             raise ListError(f"{name}:{line.number}: {error}") from None
-        found = Decision(texts["tag"], code, *(texts[c] for c in COLUMNS[2:]), place=f"{name}:{line.number}")
+        answer, who, date, reason = (texts[c] for c in COLUMNS[2:])
+        found = Decision(texts["tag"], code, answer, who, date, reason, f"{name}:{line.number}")
         before = given.setdefault((found.tag, code), found)
         if before.answer != found.answer:
-            raise ListError(f"{found.place}: {found.tag} {code} is answered '{found.answer}', and '{before.answer}' in {before.place}")
+            raise ListError(
+                f"{found.place}: {found.tag} {code} is answered '{found.answer}', and '{before.answer}' in {before.place}"
+            )
     return Decisions(given, hashlib.sha256(data).hexdigest())
 
 

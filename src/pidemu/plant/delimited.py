@@ -45,9 +45,7 @@ def read_delimited(data: bytes, file: str) -> ListSheet:
     comma = decimal_comma(cell for _, cells in rows for cell in cells)
     lines = []
     for number, cells in rows:
-        found = {
-            column: ListCell(cell, f"line {number}, column {column + 1}") for column, cell in enumerate(cells) if cell.strip()
-        }
+        found = {column: ListCell(cell, f"line {number}, column {column + 1}") for column, cell in enumerate(cells) if cell.strip()}
         if found:
             lines.append(ListLine(number, found))
             check_length(len(lines), f"{file}:{number}")

@@ -45,7 +45,13 @@ def draft_mapping(sources: Sequence[LoopSource], words: PlantWords) -> str:
     ]
     loops = [(layout, loop) for layout in layouts for loop in split_sheet(layout)[0]]
     cells = [LoopCells(loop, layout) for layout, loop in loops]
-    lines = [_HEAD, *_about_sheets(sources, layouts, loops), *_systems(cells, words), *_action_words(cells, words), *_options(cells, words)]
+    lines = [
+        _HEAD,
+        *_about_sheets(sources, layouts, loops),
+        *_systems(cells, words),
+        *_action_words(cells, words),
+        *_options(cells, words),
+    ]
     return "\n".join([*lines, *_units(cells), "blank-units: card      # card: the card's own, flagged; ask: a decision", ""])
 
 
@@ -68,15 +74,17 @@ def _about_sheets(
         yield f"  # {layout.sheet.shown}: header in line {layout.header}, {sum(1 for at, _ in loops if at is layout)} loops"
         for column in layout.columns:
             unit = ", ".join(f"{n.word} in {n.unit}" for n in column.names if n.unit)
-            hidden = ", hidden" if column.hidden else ""
             if column.field is not None:
-                yield f"  #   {_comment(column.header)}: {column.field.replace('_', '-')} ({column.why}{f'; {unit}' if unit else ''}{hidden})"
+                told = "; ".join(x for x in (column.why, unit, "hidden" if column.hidden else "") if x)
+                yield f"  #   {_comment(column.header)}: {column.field.replace('_', '-')} ({told})"
         unknown = [c for c in layout.columns if c.field is None]
         if unknown:
             known = True
             yield f"  {_text(layout.sheet.name or '*')}:"
             for column in unknown:
-                samples = [line.cells[column.index].text for line in layout.sheet.lines if column.index in line.cells][1 : 1 + _SAMPLES]
+                samples = [line.cells[column.index].text for line in layout.sheet.lines if column.index in line.cells][
+                    1 : 1 + _SAMPLES
+                ]
                 yield f"    {_text(column.header)}: other      # not known; such as {_comment(', '.join(samples)) or 'nothing'}"
     if not known:
         yield "  {}"
@@ -132,11 +140,11 @@ def _action_words(cells: Sequence[LoopCells], words: PlantWords) -> Iterator[str
     by_action: dict[str, list[str]] = {"reverse": [], "direct": []}
     unknown = []
     for word, n in sorted(_counted(cells, "action").items()):
-        action = words.actions.meaning(word)
-        if action is None:
+        meant = words.actions.meaning(word)
+        if meant is None:
             unknown.append(f"{word} ({n} loops)")
         else:
-            by_action[action].append(word)
+            by_action[meant].append(word)
     for action, found in by_action.items():
         yield f"  {action}: [{', '.join(map(_text, found))}]"
     if unknown:
@@ -163,7 +171,9 @@ def _options(cells: Sequence[LoopCells], words: PlantWords) -> Iterator[str]:
     for card_id, options in sorted(table.items()):
         yield f"  {card_id}:"
         for option, choices in options.items():
-            inner = ", ".join(f"{_text(choice)}: [{', '.join(map(_text, sorted(found)))}]" for choice, found in sorted(choices.items()))
+            inner = ", ".join(
+                f"{_text(choice)}: [{', '.join(map(_text, sorted(found)))}]" for choice, found in sorted(choices.items())
+            )
             yield f"    {option}: {{{inner}}}"
     if not table:
         yield "  {}"
@@ -178,7 +188,9 @@ def _units(cells: Sequence[LoopCells]) -> Iterator[str]:
     for setting, field in UNIT_FIELDS.items():
         for word, n in sorted(_counted(cells, field).items()):
             several = readings_of(setting, word)
-            what = "not a unit that is known" if not several else several[0] if len(several) == 1 else f"open: {' or '.join(several)}"
+            what = (
+                "not a unit that is known" if not several else several[0] if len(several) == 1 else f"open: {' or '.join(several)}"
+            )
             yield f"#   {setting}: '{_comment(word)}' ({n} loops) is {what}"
     yield "units: {}"
 

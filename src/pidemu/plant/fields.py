@@ -11,18 +11,21 @@ from typing import Final, Literal, get_args
 Field = Literal[
     "tag", "service", "area", "system", "gain", "integral", "derivative", "gain_unit", "integral_unit", "derivative_unit",
     "derivative_filter", "pv_filter", "form", "equation", "structure", "derivative_of", "pv_low", "pv_high", "pv_range", "pv_unit",
-    "new_low", "new_high", "new_range", "reranged", "out_low", "out_high", "out_limit_low", "out_limit_high", "action", "mode", "scan",
+    "new_low", "new_high", "new_range", "reranged", "out_low", "out_high", "out_limit_low", "out_limit_high", "action", "mode",
+    "scan",
     "update", "setpoint", "remarks", "options", "number", "unit", "other",
 ]  # fmt: skip
 """What a column holds. ``unit`` is the unit of the column before it, ``other`` is known and not needed."""
 FIELDS: Final[tuple[Field, ...]] = get_args(Field)
 
 _ALIASES: Final[dict[Field, str]] = {
-    "tag": "Tag, Tag No, Tag Nr, Tag Number, Tagname, Tag Name, Loop, Loop tag, Loop No, Loop Name, Instrument, Instrument tag, Point, "
+    "tag": "Tag, Tag No, Tag Nr, Tag Number, Tagname, Tag Name, Loop, Loop tag, Loop No, Loop Name, Instrument, Instrument "
+    "tag, Point, "
     "Point name, Entity, Name, Position, PLT-Stelle, PLT Stelle, Messstelle, KKS",
     "service": "Service, Description, Descriptor, DESC, PTDESC, Application, Bezeichnung, Beschreibung, Loop description",
     "area": "Area, Unit area, Plant, Plant area, Section, Anlage, Bereich",
-    "system": "System, Controller, Make, Vendor, Model, Type, Block, Block type, PLC, PLC / BLOCK, Datatype, Data type, Point type, "
+    "system": "System, Controller, Make, Vendor, Model, Type, Block, Block type, PLC, PLC / BLOCK, Datatype, Data type, "
+    "Point type, "
     "Source system, Fabrikat, Typ",
     "gain": "P, Gain, K, KC, KP, PGain, Cfg_PGain, PB, PBAND, Prop band, Proportional band, Proportional, XP, S6",
     "integral": "I, Ti, TN, T1, INT, INTEGRAL, Integral time, Reset, RSET, IGain, Cfg_IGain, KI, Nachstellzeit, S7",
@@ -47,10 +50,12 @@ _ALIASES: Final[dict[Field, str]] = {
     "out_low": "CVEULO, MSL, CVEUMin",
     "out_high": "CVEUHI, MSH, CVEUMax",
     "out_limit_low": "OP lo, OP low, OUT_LO_LIM, OPLOLM, MINO, CVLLimit, Out low, OUT MIN, OUT MIN %, Output low, Y min, LO limit",
-    "out_limit_high": "OP hi, OP high, OUT_HI_LIM, OPHILM, MAXO, CVHLimit, Out high, OUT MAX, OUT MAX %, Output high, Y max, HI limit",
+    "out_limit_high": "OP hi, OP high, OUT_HI_LIM, OPHILM, MAXO, CVHLimit, Out high, OUT MAX, OUT MAX %, Output high, Y "
+    "max, HI limit",
     "action": "Action, Act, CTLACTN, ControlAction, Control action, CA, Direct/Reverse, Dir/Rev, INC-INC/INC-DEC, Wirksinn",
     "mode": "Mode, A/M, NMODE, Normal mode, Betriebsart",
-    "scan": "Scan, Scan time, Scan rate, Period, PERIOD, Zyklus, Task, Task period, TASK / STI, Sampling, Sample time, Execution, Interval",
+    "scan": "Scan, Scan time, Scan rate, Period, PERIOD, Zyklus, Task, Task period, TASK / STI, Sampling, Sample time, "
+    "Execution, Interval",
     "update": "UPD, Update, Update time, OversampleDT, Loop update time",
     "setpoint": "SP, LSP, Setpoint, Sollwert",
     "remarks": "Remarks, Remark, Comment, Comments, Note, Notes, Bemerkung, Bemerkungen",

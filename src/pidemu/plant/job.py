@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from pidemu.card.load import Card
 from pidemu.errors import ListError, PidemuError
@@ -188,7 +188,8 @@ def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Deci
             found.loops += [_readable(loop, layout, words, decisions) for loop in loops]
         if source.export is None and not layouts:
             raise ListError(
-                f"{source.file}: no header was found: a line that names a tag and a gain or an integral setting, and two columns more; "
+                f"{source.file}: no header was found: a line that names a tag and a gain or an integral setting, and two "
+                f"columns more; "
                 "name the line and the columns in the mapping (header-lines:, columns:)"
             )
     exports = [source.export for source in sources if source.export is not None]

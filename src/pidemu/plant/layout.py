@@ -23,7 +23,9 @@ _GROUPS: Final[tuple[tuple[str, tuple[Field, Field]], ...]] = (
     (r"out|op\b|cv\b|\by\b|valve|ausgang", ("out_limit_low", "out_limit_high")),
     (r"pv|range|transmitter|meas|mess", ("pv_low", "pv_high")),
 )
-_SIGNAL_UNITS: Final = re.compile(r"°?[CFK]|deg ?[CF]|%|bar[ga]?|[kMm]?Pa[ga]?|psi[ga]?|m|mm|m³/h|m3/h|t/h|kg/h|l/min|gpm|mA|V|EU|pH", re.I)
+_SIGNAL_UNITS: Final = re.compile(
+    r"°?[CFK]|deg ?[CF]|%|bar[ga]?|[kMm]?Pa[ga]?|psi[ga]?|m|mm|m³/h|m3/h|t/h|kg/h|l/min|gpm|mA|V|EU|pH", re.I
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,9 @@ def _checked(named: Mapping[str, str], sheet: ListSheet) -> dict[str, Field]:
         field = next((f for f in FIELDS if f == word.replace("-", "_")), None)
         if field is None:
             known = [f.replace("_", "-") for f in FIELDS]
-            raise ListError(f"{sheet.shown}: column '{header}': no field '{word}'{suggest(word, known)}; fields: {', '.join(known)}")
+            raise ListError(
+                f"{sheet.shown}: column '{header}': no field '{word}'{suggest(word, known)}; fields: {', '.join(known)}"
+            )
         fields[folded(header)] = field
     return fields
 

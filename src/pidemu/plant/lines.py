@@ -12,7 +12,8 @@ from pidemu.plant.fields import Field, folded
 from pidemu.plant.layout import ListLayout
 
 _END: Final = re.compile(
-    r"\W*(end of|ende\b|total|sum\b|summe|gesamt|anzahl|count|page|seite|continued|fortsetzung|note|hinweis|legend|legende|printed|rev\b)",
+    r"\W*(end "
+    r"of|ende\b|total|sum\b|summe|gesamt|anzahl|count|page|seite|continued|fortsetzung|note|hinweis|legend|legende|printed|rev\b)",
     re.IGNORECASE,
 )
 _AREA: Final = re.compile(r"^[\W_]*(?:(?:area|anlage|unit|plant|section|bereich)\W+)?(.*?)[\W_]*$", re.IGNORECASE)
@@ -32,7 +33,8 @@ class SkippedLine:
     line : int
         Its number, from 1.
     kind : str
-        What it is: ``title``, ``header``, ``repeated header``, ``units``, ``area``, ``blank``, ``note``, ``no list``, ``hidden sheet``.
+        What it is: ``title``, ``header``, ``repeated header``, ``units``, ``area``, ``blank``, ``note``, ``no list``, ``hidden
+        sheet``.
     text : str
         What it says.
     """

@@ -32,7 +32,7 @@ class LoopCells:
         self.comma = layout.sheet.decimal_comma
 
     def filled(self, field: Field) -> list[tuple[ListCell, ListColumn]]:
-        """Return the cells of a field that say something, with their columns; those of hidden columns only where no other has it."""
+        """Return the cells of a field that say something, with their columns; of hidden columns where no other holds it."""
         columns = self.layout.holding(field)
         return [(self.line.cells[c.index], c) for c in columns if c.index in self.line.cells]
 

@@ -12,7 +12,6 @@ from pidemu.errors import PidemuError, SettingError, UnitError
 from pidemu.formatting import exactly
 from pidemu.plant.cells import ListCell
 from pidemu.plant.decisions import Decisions, note_decision
-from pidemu.plant.fields import Field
 from pidemu.plant.layout import ListColumn
 from pidemu.plant.loop_cells import LoopCells
 from pidemu.plant.mapping import PlantWords
@@ -108,12 +107,14 @@ def read_settings(reading: LoopReading, cells: LoopCells, words: PlantWords, dec
             continue
         text = f"{option} is not stated, and the units of the settings hang on it. Which is it?"
         reading.find("D-equation", text, cells.place("equation") or cells.place("form"), choices=tuple(map(LoopChoice, choices)))
-    if reading.stops("error", "decision") and any(f.code in ("D-equation", "D-unit") or f.level == "error" for f in reading.findings):
+    if reading.stops("error", "decision") and any(
+        f.code in ("D-equation", "D-unit") or f.level == "error" for f in reading.findings
+    ):
         return
-    _choose_units(reading, card, stated, cells, words)
+    _choose_units(reading, card, stated, words)
     if reading.stops("error") or any(f.code == "D-unit" for f in reading.findings):
         return
-    given = _on_dials(reading, card, stated, cells, words)
+    given = _on_dials(reading, card, stated, words)
     if given is not None:
         _make(reading, card, stated, given)
 
@@ -136,7 +137,12 @@ def _cell(reading: LoopReading, cells: LoopCells, setting: Setting, decisions: D
     except CellError as error:
         reading.find(error.code, f"{setting}: {error}", cell.place, cell.text)
         return None
-    return SettingCell(cell, column, number, stated_unit(reading, cells, setting, (cell, column), number, _decided_unit(reading, setting, decisions)))
+    return SettingCell(
+        cell,
+        column,
+        number,
+        stated_unit(reading, cells, setting, (cell, column), number, _decided_unit(reading, setting, decisions)),
+    )
 
 
 def _decided_unit(reading: LoopReading, setting: Setting, decisions: Decisions) -> str:
@@ -171,7 +177,7 @@ def _decided_choice(
     return choice
 
 
-def _choose_units(reading: LoopReading, card: Card, stated: StatedLoop, cells: LoopCells, words: PlantWords) -> None:
+def _choose_units(reading: LoopReading, card: Card, stated: StatedLoop, words: PlantWords) -> None:
     """Choose options that only say in which unit a setting stands, by the units that are stated."""
     for option, variants in unit_choices(card, stated.options):
         for setting, role in _ROLES.items():
@@ -184,7 +190,11 @@ def _choose_units(reading: LoopReading, card: Card, stated: StatedLoop, cells: L
                 if found.number is not None:
                     ask_unit(reading, setting, found.number, "no unit is stated", found.cell, [u for u in units.values() if u])
                 continue
-            same = [c for c, own in units.items() if own and is_reciprocal(role, parse_unit(own)) == is_reciprocal(role, parse_unit(unit))]
+            same = [
+                c
+                for c, own in units.items()
+                if own and is_reciprocal(role, parse_unit(own)) == is_reciprocal(role, parse_unit(unit))
+            ]
             if same:
                 stated.options[option] = same[0]
 
@@ -194,7 +204,7 @@ def _own_unit(variant: Variant, role: Role) -> str:
     return "" if name is None else variant.equation.settings[name].unit
 
 
-def _on_dials(reading: LoopReading, card: Card, stated: StatedLoop, cells: LoopCells, words: PlantWords) -> dict[str, Any] | None:
+def _on_dials(reading: LoopReading, card: Card, stated: StatedLoop, words: PlantWords) -> dict[str, Any] | None:
     """Return what is given for each dial, as text with a unit or as a number in the card's own."""
     try:
         variant = card.variant(stated.options)
@@ -252,7 +262,9 @@ def _dial_value(
     if unit.source == "card" and number:
         reading.find("F-unit-assumed", f"{dial}: no unit is stated, {own.name} was taken, the card's own", cell.place, cell.text)
     elif is_other(unit.unit, own) and number:
-        reading.find("F-unit-other", f"{dial} is stated in {shown_unit(unit.unit)}, the dial is in {own.name}", cell.place, cell.text)
+        reading.find(
+            "F-unit-other", f"{dial} is stated in {shown_unit(unit.unit)}, the dial is in {own.name}", cell.place, cell.text
+        )
     if not number or unit.unit == own.name or (unit.unit == "1" and own.dimension in (Dimension.RATIO, Dimension.OP_PER_PV)):
         return number
     text = "s/repeat" if unit.unit == "s" and setting == "integral" and own.dimension is Dimension.REPEATS_PER_TIME else unit.unit
@@ -322,9 +334,9 @@ def note_settings(reading: LoopReading, settings: Settings) -> None:
     elif gain is not None and not gain.value:
         reading.find("D-zero-gain", f"{gain.name} is 0, and other settings are not")
     tuned = [v for v in (gain, integral) if v is not None]
-    if len(tuned) == 2 and all(v.setting.default is not None and v.value == v.setting.default for v in tuned):
-        if derivative is None or derivative.off or derivative.value == derivative.setting.default:
-            reading.find("D-default", f"the settings are those that {settings.card.id} is delivered with")
+    delivered = len(tuned) == 2 and all(v.setting.default is not None and v.value == v.setting.default for v in tuned)
+    if delivered and (derivative is None or derivative.off or derivative.value == derivative.setting.default):
+        reading.find("D-default", f"the settings are those that {settings.card.id} is delivered with")
     law = settings.algorithm()
     if not law.ki and not {"D-no-integral", "D-unused", "D-zero-gain"} & set(reading.codes):
         reading.find("D-no-integral", "there is no integral action")

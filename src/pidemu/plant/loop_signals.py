@@ -20,7 +20,9 @@ from pidemu.plant.words import mode_named, range_change
 from pidemu.settings.action import ACTIONS, FORMULA, Action
 from pidemu.settings.ranges import SignalRange, read_range
 
-_ONE_CELL: Final = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:\.\.+|-|–|…|to|bis|/)\s*([-+]?\d+(?:[.,]\d+)?)\s*(\D.*)?", re.IGNORECASE)
+_ONE_CELL: Final = re.compile(
+    r"\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:\.\.+|-|–|…|to|bis|/)\s*([-+]?\d+(?:[.,]\d+)?)\s*(\D.*)?", re.IGNORECASE
+)
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 _OTHER_ACTION: Final[dict[Action, Action]] = {"reverse": "direct", "direct": "reverse"}
 COUNTS: Final = "counts"
@@ -67,14 +69,14 @@ def read_new_range(reading: LoopReading, cells: LoopCells, decisions: Decisions)
             LoopChoice("same signal", f"{old} becomes {new}: the same signal on another scale, the gain stays"),
             LoopChoice("other range", f"{old} becomes {new}: another range, the gain changes with the span"),
         )
-        reading.find("D-rerange", f"the new range is {new}, and not whether it is the same signal. Which is it?", place, choices=choices)
+        reading.find(
+            "D-rerange", f"the new range is {new}, and not whether it is the same signal. Which is it?", place, choices=choices
+        )
     elif old is None:
         reading.find("D-range", f"the measurement gets the range {new}, and its range now is not stated", cells.place("pv_low"))
 
 
-def _range(
-    reading: LoopReading, cells: LoopCells, fields: tuple[Field, Field, Field | None], what: str
-) -> SignalRange | None:
+def _range(reading: LoopReading, cells: LoopCells, fields: tuple[Field, Field, Field | None], what: str) -> SignalRange | None:
     low, high = (_number(reading, cells, field) for field in fields[:2])
     unit = cells.text("pv_unit") if what != "the output" else "%"
     place = cells.place(fields[0])
@@ -82,7 +84,9 @@ def _range(
         match = _ONE_CELL.fullmatch(cells.text(fields[2]))
         place = cells.place(fields[2])
         if match is None:
-            reading.find("E-range", f"'{cells.text(fields[2])}' is not a range; write it such as 0..250 °C", place, cells.text(fields[2]))
+            reading.find(
+                "E-range", f"'{cells.text(fields[2])}' is not a range; write it such as 0..250 °C", place, cells.text(fields[2])
+            )
             return None
         low, high = (float(x.replace(",", ".")) for x in match.groups()[:2])
         unit = (match[3] or unit).strip()
@@ -109,7 +113,7 @@ def _number(reading: LoopReading, cells: LoopCells, field: Field) -> float | Non
 
 def read_limits(reading: LoopReading, cells: LoopCells) -> None:
     """Read the output limits."""
-    low, high = (_number(reading, cells, field) for field in ("out_limit_low", "out_limit_high"))  # type: ignore[arg-type]
+    low, high = (_number(reading, cells, field) for field in ("out_limit_low", "out_limit_high"))
     if low is None or high is None:
         return
     place = cells.place("out_limit_low")
@@ -162,7 +166,9 @@ def _time(reading: LoopReading, cells: LoopCells, field: Field) -> float | None:
         return None
     unit = _time_unit(number.unit, column)
     if unit is None or number.value < 0 or (number.value == 0 and field != "pv_filter"):
-        reading.find("E-unit" if unit is None else "E-number", f"{field.replace('_', ' ')}: '{cell.text}' is not a time", *_at(cell))
+        reading.find(
+            "E-unit" if unit is None else "E-number", f"{field.replace('_', ' ')}: '{cell.text}' is not a time", *_at(cell)
+        )
         return None
     return number.value * unit
 
@@ -196,9 +202,16 @@ def read_action(reading: LoopReading, cells: LoopCells, words: PlantWords, decis
     choices = tuple(LoopChoice(a, f"error {FORMULA[a]}: {names[a]}") for a in ACTIONS)
     said = f"'{text}' is not a word for an action" if action is None and text else "the action is blank"
     if action is not None:
-        said = f"on {card.id} '{text}' is {names[_OTHER_ACTION[action]]}, which acts the other way; the mapping does not say what it means"
+        said = f"on {card.id} '{text}' is {names[_OTHER_ACTION[action]]}, which acts the other way; the mapping does not "
+        "say what it means"
     place, own = ("", "") if cell is None else _at(cell)
-    reading.find("D-action", f"{said}. Does the output fall or rise when the measurement rises?", place or cells.place("action"), own, choices=choices)
+    reading.find(
+        "D-action",
+        f"{said}. Does the output fall or rise when the measurement rises?",
+        place or cells.place("action"),
+        own,
+        choices=choices,
+    )
 
 
 def _is_crossed(card: Card, action: Action, text: str, words: PlantWords) -> bool:

@@ -34,7 +34,8 @@ class MappingFile(Model):
     systems: dict[Text, list[Text]] = Field(default={}, description="Card, and the cells under System that mean it.")
     words: dict[Text, list[Text] | dict[Text, Spellings] | Text] = Field(
         default={},
-        description="reverse and direct: the words for the action; other names: choices of options and the words for them. A text is a remark.",
+        description="reverse and direct: the words for the action; other names: choices of options and the words for them. "
+        "A text is a remark.",
     )
     options: dict[Text, dict[Text, dict[Text, Spellings]]] = Field(
         default={}, description="By card, option and choice: the words for the choice."
@@ -49,7 +50,9 @@ class MappingFile(Model):
     blank_units: Literal["card", "ask"] = Field(
         default="card", description="What a blank unit is: the card's own, which is flagged, or a decision."
     )
-    sheets: list[Text] | None = Field(default=None, description="The sheets to read, hidden ones as well; by default all that are visible.")
+    sheets: list[Text] | None = Field(
+        default=None, description="The sheets to read, hidden ones as well; by default all that are visible."
+    )
     superseded_sheets: list[Text] = Field(default=[], description="Sheets that are not read.")
 
 

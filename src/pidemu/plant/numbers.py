@@ -67,7 +67,8 @@ def cell_number(cell: ListCell, comma: bool | None) -> CellNumber:
     if cell.is_date or (isinstance(cell.value, str) and _DATE.fullmatch(cell.text)):
         raise CellError(
             "E-date",
-            f"'{cell.text}' is a date: spreadsheets make dates of fractions, part numbers and decimals; type the number again as text",
+            f"'{cell.text}' is a date: spreadsheets make dates of fractions, part numbers and decimals; type the number "
+            f"again as text",
         )
     if isinstance(cell.value, float):
         return CellNumber(cell.value)
@@ -76,7 +77,9 @@ def cell_number(cell: ListCell, comma: bool | None) -> CellNumber:
     if match is None or not any(c.isdigit() for c in match[1]):
         raise CellError("E-number", f"'{text}' is not a number; write the number, and its unit behind it or in the unit column")
     if _NOT_A_UNIT.search(match[2]):
-        raise CellError("E-number", f"'{text}' is a number with a mark, so somebody doubted it; find out, and write the number alone")
+        raise CellError(
+            "E-number", f"'{text}' is a number with a mark, so somebody doubted it; find out, and write the number alone"
+        )
     return CellNumber(_value(match[1].replace(" ", ""), text, comma), match[2].strip())
 
 
@@ -90,7 +93,8 @@ def _value(digits: str, text: str, comma: bool | None) -> float:
     elif marks and _THOUSANDS.fullmatch(digits) and (marks[0] == ",") is not comma:
         one, other = digits.replace(",", "."), re.sub(r"[.,]", "", digits)
         raise CellError(
-            "E-number", f"'{text}' can be {one} or {other}: nothing in the file says what the mark means; write it without thousands"
+            "E-number",
+            f"'{text}' can be {one} or {other}: nothing in the file says what the mark means; write it without thousands",
         )
     try:
         return float(digits.replace(",", "."))

@@ -68,7 +68,9 @@ def _outcome(
         stops = next((f.text for f in other.findings if f.level != "flag"), "not converted")
         return replace(choice, outcome=stops), None
     c = converted.conversion
-    dials = ", ".join(f"{n} {v.value:.5g}" for n, v in c.settings.items() if v.active and v.role.value in ("gain", "integral", "derivative"))
+    dials = ", ".join(
+        f"{n} {v.value:.5g}" for n, v in c.settings.items() if v.active and v.role.value in ("gain", "integral", "derivative")
+    )
     return replace(choice, outcome=f"{dials} ({c.verdict})"), c
 
 

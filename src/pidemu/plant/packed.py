@@ -1,6 +1,7 @@
 """What has to be known of a packed workbook (xlsx, ods) before it is opened: its size unpacked, its cells, what is hidden.
 
-A small file can unpack to gigabytes, and a single cell in the last row and column makes a table of 17 thousand million. So all parts
+A small file can unpack to gigabytes, and a single cell in the last row and column makes a table of 17 thousand million. So all
+parts
 are unpacked once, a piece at a time, and the sheets are looked through by a parser that knows no entities.
 """
 
@@ -62,9 +63,7 @@ def hidden_parts(data: bytes, file: str) -> dict[str, HiddenParts]:
             if "content.xml" in names:
                 return _of_ods(archive, file)
             if "xl/workbook.xml" in names:
-                return {
-                    sheet: _of_sheet(archive, part, file) for sheet, part in _sheet_parts(archive, file) if part in names
-                }
+                return {sheet: _of_sheet(archive, part, file) for sheet, part in _sheet_parts(archive, file) if part in names}
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, OSError) as error:
         raise ListError(f"{file}: a damaged workbook ({error}); open it and save it again") from None
     raise ListError(f"{file}: a zip archive without a workbook in it; give the list as CSV, xlsx, xls, ods or L5X")
@@ -78,7 +77,8 @@ def _check_size(archive: zipfile.ZipFile, file: str) -> None:
             unpacked += len(piece)
             if unpacked > _MOST_BYTES:
                 raise ListError(
-                    f"{file}: unpacks to more than {_MOST_BYTES // 2**20} MB (in {part.filename}), which is too much for a loop list"
+                    f"{file}: unpacks to more than {_MOST_BYTES // 2**20} MB (in {part.filename}), which is too much for a "
+                    f"loop list"
                 )
 
 
@@ -173,7 +173,8 @@ def _of_sheet(archive: zipfile.ZipFile, part: str, file: str) -> HiddenParts:
 def _check_cells(rows: int, columns: int, place: str) -> None:
     if rows * columns > _MOST_CELLS:
         raise ListError(
-            f"{place}: {rows:,} rows and {columns:,} columns are more than a loop list has; delete what stands far out, and save it again"
+            f"{place}: {rows:,} rows and {columns:,} columns are more than a loop list has; delete what stands far out, and "
+            f"save it again"
         )
 
 

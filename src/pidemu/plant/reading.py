@@ -59,7 +59,9 @@ def read_loop(loop: LoopLine, layout: ListLayout, words: PlantWords, decisions: 
     if loop.line.hidden:
         reading.find("F-hidden-row", "the line is hidden in the spreadsheet", f"line {loop.line.number}")
     for column in cells.hidden:
-        reading.find("F-hidden-row", f"the column '{column.header}' is hidden in the spreadsheet", cells.line.cells[column.index].place)
+        reading.find(
+            "F-hidden-row", f"the column '{column.header}' is hidden in the spreadsheet", cells.line.cells[column.index].place
+        )
     if not reading.tag:
         reading.find("E-tag", "the tag is blank", cells.place("tag"))
     _read_card(reading, cells, words)
@@ -112,7 +114,14 @@ def _put_filter(reading: LoopReading, stated: StatedLoop, time: float) -> None:
     """Put a filter of the measurement on the card's own dial, or in front of the block."""
     if not time or reading.card is None:
         return
-    dial = next((n for n, s in reading.card.all_settings().items() if s.sets == Role.FILTER_TIME and "measurement" in (s.about or "")), None)
+    dial = next(
+        (
+            n
+            for n, s in reading.card.all_settings().items()
+            if s.sets == Role.FILTER_TIME.value and "measurement" in (s.about or "")
+        ),
+        None,
+    )
     if dial is not None:
         stated.dials[dial] = f"{time!r} s"
     else:
@@ -156,13 +165,20 @@ def _choices(settings: Settings, option: str) -> tuple[LoopChoice, ...]:
             a = settings.changed({option: choice}).algorithm()
         except PidemuError:
             continue
-        found.append(LoopChoice(choice, f"kp {a.kp:.4g}, ki {a.ki:.4g} 1/s, kd {a.kd:.4g} s", ratio=a.kp / base.kp if base.kp else 1.0))
+        found.append(
+            LoopChoice(choice, f"kp {a.kp:.4g}, ki {a.ki:.4g} 1/s, kd {a.kd:.4g} s", ratio=a.kp / base.kp if base.kp else 1.0)
+        )
     return tuple(found)
 
 
 def ask_mode(reading: LoopReading, decisions: Decisions) -> None:
     """Ask for the mode where the equation follows it and it is not known."""
-    if reading.settings is None or reading.card is None or reading.mode in ("auto", "cascade") or not depends_on_mode(reading.settings):
+    if (
+        reading.settings is None
+        or reading.card is None
+        or reading.mode in ("auto", "cascade")
+        or not depends_on_mode(reading.settings)
+    ):
         return
     decided = decisions.answer(reading.tag, "D-mode")
     if decided is not None and decided.answer.casefold() in ("auto", "cascade"):
@@ -170,7 +186,8 @@ def ask_mode(reading: LoopReading, decisions: Decisions) -> None:
         reading.mode = decided.answer.casefold()
         return
     choices = (LoopChoice("auto", "the operator sets the setpoint"), LoopChoice("cascade", "another controller sets the setpoint"))
-    text = f"on {reading.card.id} other terms see the setpoint in cascade, and the mode is {reading.mode or 'not stated'}. Which is it?"
+    text = f"on {reading.card.id} other terms see the setpoint in cascade, and the mode is {reading.mode or 'not stated'}. "
+    "Which is it?"
     reading.find("D-mode", text, choices=choices)
 
 

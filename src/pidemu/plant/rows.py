@@ -12,6 +12,7 @@ from pidemu.plant.codes import CODES, Level, RowClass, class_of
 from pidemu.plant.converting import LoopConversion
 from pidemu.plant.reading_model import Decision, Finding, LoopReading
 
+
 @dataclass(frozen=True)
 class RetrofitRow:
     """A loop of the list, and what became of it.

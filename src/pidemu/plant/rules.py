@@ -57,7 +57,8 @@ class RuleFile(Model):
     pv_filter: PvFilter = Field(default="carry", description="What becomes of a filter of the measurement.")
     second_target: SecondTarget | None = Field(default=None, description="Another target of the same lists.")
     stop: list[Text] | Text = Field(
-        default=[], description="What needs a decision: codes, or words for them, as a list or with commas between. They stop loops anyway."
+        default=[],
+        description="What needs a decision: codes, or words for them, as a list or with commas between. They stop loops anyway.",
     )
     levels: dict[Text, Literal["error", "decision", "flag"]] = Field(default={}, description="Codes with another level.")
     allowed_deviation: Number | None = Field(

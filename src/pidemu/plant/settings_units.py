@@ -1,4 +1,4 @@
-"""Which unit a gain, an integral or a derivative setting is in: the cell, its column, the header, the mapping, the card, in this order."""
+"""Which unit a setting is in: that of the cell, its column, the header, the mapping, the card, in this order."""
 
 from __future__ import annotations
 
@@ -74,7 +74,8 @@ def stated_unit(
         return UnitReading(decided, "decision")
     beside = cells.cell(UNIT_FIELDS[setting])
     said = [(text, place, where) for text, place, where in (
-        (number.unit, cell.place, "cell"), ("" if beside is None else beside.text, "" if beside is None else beside.place, "unit column"),
+        (number.unit, cell.place, "cell"), ("" if beside is None else beside.text, "" if beside is None else beside.place,
+        "unit column"),
     ) if text]  # fmt: skip
     units = []
     for text, place, where in said:
@@ -180,12 +181,17 @@ def _alike(a: str, b: str) -> bool:
 
 
 def _same_kind(one: Unit, other: Unit) -> bool:
-    return any(one.dimension in kinds and other.dimension in kinds for kinds in (_TIMELIKE, _RATES)) or one.dimension is other.dimension
+    return (
+        any(one.dimension in kinds and other.dimension in kinds for kinds in (_TIMELIKE, _RATES))
+        or one.dimension is other.dimension
+    )
 
 
 def _ask(reading: LoopReading, setting: Setting, number: CellNumber, text: str, cell: ListCell, units: list[str]) -> None:
     named = "derivative: " if setting == "derivative" else ""  # a time alone would be that of the integral
-    choices = tuple(LoopChoice(f"{named}{unit}", f"{number.value:g} is {_SAYS.get(unit, f'{_a(setting)} in {unit}')}") for unit in units)
+    choices = tuple(
+        LoopChoice(f"{named}{unit}", f"{number.value:g} is {_SAYS.get(unit, f'{_a(setting)} in {unit}')}") for unit in units
+    )
     reading.find("D-unit", f"{setting}: {text}. Which is it?", cell.place, cell.text, choices=choices)
 
 

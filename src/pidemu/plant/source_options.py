@@ -17,7 +17,12 @@ from pidemu.units import Role
 
 OPTION_FIELDS: Final[tuple[Field, ...]] = ("form", "equation", "structure", "derivative_of")
 """Columns whose words are choices of options."""
-_CODE: Final[dict[Field, str]] = {"form": "D-form", "equation": "D-equation", "structure": "D-structure", "derivative_of": "D-structure"}
+_CODE: Final[dict[Field, str]] = {
+    "form": "D-form",
+    "equation": "D-equation",
+    "structure": "D-structure",
+    "derivative_of": "D-structure",
+}
 _ASSIGNMENT: Final = re.compile(r"([A-Za-z_]\w*)\s*[=:]\s*([^\s,;]+)")
 _ROLES: Final = (Role.GAIN, Role.INTEGRAL, Role.DERIVATIVE)
 
@@ -56,15 +61,14 @@ def stated_options(reading: LoopReading, card: Card, cells: LoopCells, words: Pl
     for field, text, place in unknown:
         if not _agrees(card, options, field, text):
             reading.find(
-                _CODE[field], f"'{text}' is not a word for an option of {card.id}; add it to the mapping, or correct it", place, text,
+                _CODE[field], f"'{text}' is not a word for an option of {card.id}; add it to the mapping, or correct it",
+                place, text,
                 choices=tuple(LoopChoice(c, o) for o, choices in card.options.items() for c in choices)[:6],
             )  # fmt: skip
     return options, dials
 
 
-def _state(
-    reading: LoopReading, options: dict[str, str], meaning: tuple[str, str], field: Field, place: str, text: str
-) -> None:
+def _state(reading: LoopReading, options: dict[str, str], meaning: tuple[str, str], field: Field, place: str, text: str) -> None:
     option, choice = meaning
     if options.setdefault(option, choice) != choice:
         choices = (LoopChoice(options[option]), LoopChoice(choice))

@@ -42,7 +42,9 @@ def read_spreadsheet(data: bytes, file: str) -> list[ListSheet]:
     try:
         book: Any = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
         return [
-            _sheet(book, known, file, hidden.get(known.name, HiddenParts()), known.visible == calamine.SheetVisibleEnum.Visible, notes)
+            _sheet(
+                book, known, file, hidden.get(known.name, HiddenParts()), known.visible == calamine.SheetVisibleEnum.Visible, notes
+            )
             for known in book.sheets_metadata
             if known.typ == calamine.SheetTypeEnum.WorkSheet
         ]

@@ -15,7 +15,8 @@ _GAIN: Final = {
     "%/eu": "%/eu",
 }
 _INTEGRAL: Final = {
-    "repeat/min": "rep/min; rpt/min; R/MIN; repeats/min; repeat/min; RPM; RPTS/MIN; Rpts/Min; reps/min; repeats per minute; rep./min; "
+    "repeat/min": "rep/min; rpt/min; R/MIN; repeats/min; repeat/min; RPM; RPTS/MIN; Rpts/Min; reps/min; repeats per minute; "
+    "rep./min; "
     "repeats per min; Wdh/min",
     "1/min": "1/min; per minute; min^-1; min-1; /min",
     "repeat/s": "rep/s; rpt/s; repeats/s; repeats/sec; rep/sec; rpt/sec; repeats per second",
@@ -51,7 +52,8 @@ def _plain(text: str) -> str:
 
 
 _SPELLED: Final = {
-    setting: {_plain(word): unit for unit, words in table.items() for word in words.split("; ")} for setting, table in _TABLES.items()
+    setting: {_plain(word): unit for unit, words in table.items() for word in words.split("; ")}
+    for setting, table in _TABLES.items()
 }
 
 
@@ -86,7 +88,9 @@ def readings_of(setting: Setting, text: str) -> tuple[str, ...]:
     marked = unit_of(setting, bare) if bare != text.strip() else None
     if marked is None:
         return ()
-    return (_per_repeat(marked), _OTHER_WAY.get(marked, marked)) if setting == "integral" else (marked, _OTHER_WAY.get(marked, marked))
+    return (
+        (_per_repeat(marked), _OTHER_WAY.get(marked, marked)) if setting == "integral" else (marked, _OTHER_WAY.get(marked, marked))
+    )
 
 
 _OTHER_WAY: Final = {

@@ -32,7 +32,9 @@ _UNUSED: Final = re.compile(
     r"au(ß|ss)er betrieb|nicht benutzt|demontiert|\breserve\b",
     re.IGNORECASE,
 )
-_HARMLESS: Final = re.compile(r"\W*(none|no|n/?a|keine|standard|normal|pv.?track\w*|sp.?track\w*|track\w*|bumpless|anti.?windup|arw)?\W*", re.I)
+_HARMLESS: Final = re.compile(
+    r"\W*(none|no|n/?a|keine|standard|normal|pv.?track\w*|sp.?track\w*|track\w*|bumpless|anti.?windup|arw)?\W*", re.I
+)
 _YES: Final = ("y", "yes", "j", "ja", "true", "1", "x", "other range", "otherrange")
 _NO: Final = ("n", "no", "nein", "false", "0", "same signal", "samesignal")
 

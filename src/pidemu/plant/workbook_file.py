@@ -30,7 +30,9 @@ def check_installed() -> None:
         raise ListError("a workbook needs xlsxwriter, which is not installed; pip install 'pidemu[retrofit]' brings it") from None
 
 
-def write_workbook(path: str | Path, rows: Sequence[RetrofitRow], document: Mapping[str, Any], inputs: Iterable[str | Path] = ()) -> None:
+def write_workbook(
+    path: str | Path, rows: Sequence[RetrofitRow], document: Mapping[str, Any], inputs: Iterable[str | Path] = ()
+) -> None:
     """Write the workbook of a job.
 
     Parameters
@@ -60,7 +62,9 @@ def _fill(data: io.BytesIO, rows: Sequence[RetrofitRow], document: Mapping[str, 
     import xlsxwriter
 
     day = datetime.datetime.combine(datetime.date.fromisoformat(document["date"]), datetime.time())
-    book = xlsxwriter.Workbook(data, {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": False})
+    book = xlsxwriter.Workbook(
+        data, {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False, "nan_inf_to_errors": False}
+    )
     book.set_properties({"title": "pidemu retrofit", "created": day, "comments": f"pidemu {document['pidemu']}"})
     writer = _Writer(book)
     converted = [row for row in rows if row.row_class == "converted"]
@@ -87,9 +91,13 @@ def _summary(document: Mapping[str, Any]) -> list[tuple[str, Any]]:
     found += [(f"verdict: {name}", n) for name, n in s["verdicts"].items()]
     for what in ("cards", "areas"):
         found.append(("", ""))
-        found += [(f"{what.removesuffix('s')} {name}", ", ".join(f"{n} {c}" for c, n in table.items())) for name, table in s[what].items()]
+        found += [
+            (f"{what.removesuffix('s')} {name}", ", ".join(f"{n} {c}" for c, n in table.items())) for name, table in s[what].items()
+        ]
     found += [("", ""), *((f"{code}: {CODES[code].about}", n) for code, n in s["codes"].items()), ("", "")]
-    found += [(f"SHA-256 of {name}", digest) for table in ("files", "made_with", "cards") for name, digest in document[table].items()]
+    found += [
+        (f"SHA-256 of {name}", digest) for table in ("files", "made_with", "cards") for name, digest in document[table].items()
+    ]
     found += [("level", f"{code} is {level}") for code, level in document["levels"].items()]
     return found + [("note", note) for note in document["notes"]]
 
@@ -148,7 +156,13 @@ class _Writer:
             shade = self.by_verdict.get(str(row.get("verdict")))
             for at, column in enumerate(columns):
                 value = row.get(column)
-                own = self.open if answers and column in ("answer", "name", "date", "reason") else shade if column == "verdict" else None
+                own = (
+                    self.open
+                    if answers and column in ("answer", "name", "date", "reason")
+                    else shade
+                    if column == "verdict"
+                    else None
+                )
                 self._write(sheet, count, at, value, own)
                 widths[at] = max(widths[at], min(len(str(value)) if value is not None else 0, _WIDEST))
             if answers:

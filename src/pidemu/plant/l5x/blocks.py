@@ -22,9 +22,36 @@ _BITS: Final = {
 """Bits of CTL: the control word of a PID tag."""
 _DECIDING: Final = ("CL", "DOE", "SWM", "CA", "MO", "PE", "NDF", "NOBC", "NOZC")
 """Bits that are set by a person; the others change while the block runs."""
-_REALS: Final = (
-    "SP KP KI KD BIAS MAXS MINS DB SO MAXO MINO UPD PV ERR OUT PVH PVL DVP DVN PVDB DVDB MAXI MINI TIE MAXCV MINCV MINTIE MAXTIE".split()
-)
+_REALS: Final = [
+    "SP",
+    "KP",
+    "KI",
+    "KD",
+    "BIAS",
+    "MAXS",
+    "MINS",
+    "DB",
+    "SO",
+    "MAXO",
+    "MINO",
+    "UPD",
+    "PV",
+    "ERR",
+    "OUT",
+    "PVH",
+    "PVL",
+    "DVP",
+    "DVN",
+    "PVDB",
+    "DVDB",
+    "MAXI",
+    "MINI",
+    "TIE",
+    "MAXCV",
+    "MINCV",
+    "MINTIE",
+    "MAXTIE",
+]
 _DATA: Final = 17
 _GAINS: Final[Mapping[Block, tuple[str, ...]]] = {"PID": ("KP", "KI", "KD"), "PIDE": ("PGain", "IGain", "DGain")}
 

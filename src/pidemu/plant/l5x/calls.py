@@ -10,7 +10,32 @@ from typing import Final
 from pidemu.plant.l5x.tree import L5xElement
 
 _CONDITIONS: Final = frozenset(
-    "XIC XIO ONS OSR OSF AFI EQU NEQ LES LEQ GRT GEQ LIM MEQ CMP EQ NE LT LE GT GE LIMIT ISINF ISNAN".split()
+    [
+        "XIC",
+        "XIO",
+        "ONS",
+        "OSR",
+        "OSF",
+        "AFI",
+        "EQU",
+        "NEQ",
+        "LES",
+        "LEQ",
+        "GRT",
+        "GEQ",
+        "LIM",
+        "MEQ",
+        "CMP",
+        "EQ",
+        "NE",
+        "LT",
+        "LE",
+        "GT",
+        "GE",
+        "LIMIT",
+        "ISINF",
+        "ISNAN",
+    ]
 )
 """Instructions that can keep what follows on the rung from being executed."""
 _NAME: Final = re.compile(r"[A-Za-z_]\w*")

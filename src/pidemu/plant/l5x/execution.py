@@ -100,10 +100,10 @@ def read_code(controller: L5xElement, types: TypeTable) -> ControllerCode:
     types : TypeTable
         Its types and instructions.
     """
-    return _Reader(controller, types).read()
+    return _CodeReader(controller, types).read()
 
 
-class _Reader:
+class _CodeReader:
     def __init__(self, controller: L5xElement, types: TypeTable) -> None:
         self.controller = controller
         self.types = types
@@ -122,8 +122,10 @@ class _Reader:
             for program in task.all("ScheduledPrograms", "ScheduledProgram"):
                 scheduled[program.get("Name")].append(task)
         for name, program in self.programs.items():
-            for task_or_none in scheduled.get(name) or [None]:
-                self._program(name, program, task_or_none)
+            for task in scheduled[name]:
+                self._program(name, program, task)
+            if not scheduled[name]:
+                self._program(name, program, None)
         for scope, tags in self.tags.items():
             for alias, target in tags.items():
                 if target:
@@ -160,7 +162,9 @@ class _Reader:
             master = call.operands[_MASTER] if call.name == "PID" and len(call.operands) > _MASTER else "0"
             named = None if master in ("0", "", "?") else self._operand(master, where)
             self.found.executions[key].append(
-                Execution(place, where.period, where.kind, conditional, where.state, where.by_inout and self._is_bound(call, where), named)
+                Execution(
+                    place, where.period, where.kind, conditional, where.state, where.by_inout and self._is_bound(call, where), named
+                )
             )
         elif call.name in self.types.instructions and call.operands and where.depth < _DEEPEST:
             self._instruction(call, where, place, conditional)
@@ -185,7 +189,15 @@ class _Reader:
         for local in definition.all("LocalTags", "LocalTag"):
             bound[local.get("Name")] = (instance[0], f"{instance[1]}.{local.get('Name')}")
         inner = _Where(
-            where.program, f"{place} ({call.name})", where.period, where.kind, where.state, conditional, bound, True, where.depth + 1
+            where.program,
+            f"{place} ({call.name})",
+            where.period,
+            where.kind,
+            where.state,
+            conditional,
+            bound,
+            True,
+            where.depth + 1,
         )
         for found in self._logic_of(call.name):
             self._call(found, inner)

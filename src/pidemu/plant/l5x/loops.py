@@ -121,7 +121,9 @@ def loops_of(root: L5xElement, file: str) -> L5xExport:
             loop.flags.append("same-name-in-two-scopes")
     notes = [f"{file}: {kind} {name} is not read: no card has it yet" for kind, name in _unread(controller)]
     if not code.has_tasks:
-        notes.append(f"{file}: a {root.get('TargetType') or 'partial'} export holds no tasks, so how often a block is executed is not known")
+        notes.append(
+            f"{file}: a {root.get('TargetType') or 'partial'} export holds no tasks, so how often a block is executed is not known"
+        )
     name = controller.get("Name")
     return L5xExport(file, name, root.get("TargetType"), root.get("ExportDate"), loops, notes, code.has_tasks)
 

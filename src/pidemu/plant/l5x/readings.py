@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Final
 
 from pidemu.card.library import load_card
@@ -62,10 +63,9 @@ def readings_of_exports(
         known = {path for other in exports if other.controller == export.controller for path in (x.path for x in other.loops)}
         others = [(e, x) for e, x in same if _contents(x) != _contents(loop)] if chosen is None else []
 
-        def again(given: Decisions, at: Any = (export, loop, others, known, several, len(same))) -> LoopReading:
-            return _reading(*at, given)
+        fixed = partial(_reading, export, loop, others, known, several, len(same))
 
-        yield again(decisions), again
+        yield fixed(decisions), fixed
 
 
 def _chosen(same: Sequence[tuple[L5xExport, L5xLoop]], several: bool, decisions: Decisions) -> tuple[L5xExport, L5xLoop] | None:
@@ -129,7 +129,11 @@ def _note_difference(
 ) -> None:
     for other, found in others:
         names = [n for n, v in loop.values.settings.items() if v != found.values.settings.get(n)]
-        what = ", ".join(f"{n} {loop.values.settings[n]:g} and {found.values.settings.get(n)}" for n in names if loop.values.settings[n] is not None)
+        what = ", ".join(
+            f"{n} {loop.values.settings[n]:g} and {found.values.settings.get(n)}"
+            for n in names
+            if loop.values.settings[n] is not None
+        )
         text = (
             f"{loop.path} has other contents in {export.file} of {export.date} and in {other.file} of {other.date}"
             f"{f': {what}' if what else ''}. Which counts?"
@@ -142,12 +146,16 @@ def _read(reading: LoopReading, loop: L5xLoop, decisions: Decisions, place: str,
     reading.card = load_card(loop.card)
     reading.action, reading.limits = values.action, values.limits
     if values.limits != (0.0, 100.0):
-        reading.find("F-limits", f"the output limits are {values.limits[0]:g} and {values.limits[1]:g} %: set them on the target", place)
+        reading.find(
+            "F-limits", f"the output limits are {values.limits[0]:g} and {values.limits[1]:g} %: set them on the target", place
+        )
     low, high = values.pv_range
     if low < high:
         reading.pv_range = SignalRange(low, high)
     else:
-        reading.find("E-range", f"the range of the measurement is {low:g} to {high:g}; its low end is not below its high end", place)
+        reading.find(
+            "E-range", f"the range of the measurement is {low:g} to {high:g}; its low end is not below its high end", place
+        )
         return
     _read_interval(reading, loop, decisions, place)
     given = {name: value for name, value in values.settings.items() if value is not None}

@@ -87,8 +87,9 @@ class TypeTable:
                     yield from self._expected(inner, f"{at}.{name}", "" if size == "0" else size, depth + 1)
             elif kind in self.instructions:
                 for local in self.instructions[kind].all("LocalTags", "LocalTag"):
-                    inner = self._expected(local.get("DataType"), f"{at}.{local.get('Name')}", local.get("Dimensions"), depth + 1)
-                    yield from ((p, b, True) for p, b, _ in inner)
+                    path_of_it = f"{at}.{local.get('Name')}"
+                    for p, b, _ in self._expected(local.get("DataType"), path_of_it, local.get("Dimensions"), depth + 1):
+                        yield p, b, True
 
     def _holds(self, kind: str, above: frozenset[str]) -> bool:
         """Whether a type holds blocks, however deep; an array of what holds none need not be gone through."""
@@ -101,9 +102,7 @@ class TypeTable:
             self._holding[kind] = any(self._holds(part, above | {kind}) for part in parts)
         return self._holding.get(kind, False)
 
-    def _positional(
-        self, tag: L5xElement, expected: list[tuple[str, Block, bool]], named: set[str]
-    ) -> Iterator[FoundBlock]:
+    def _positional(self, tag: L5xElement, expected: list[tuple[str, Block, bool]], named: set[str]) -> Iterator[FoundBlock]:
         """Yield blocks whose values stand in the L5K text alone: what has the shape of a PID tag, in the order of the type."""
         text = next((d.text for d in tag.all("Data") if d.get("Format") == "L5K"), "")
         shaped: list[list[Positional]] = []
@@ -161,5 +160,15 @@ def _indices(dimensions: str) -> Iterator[str]:
     if not sizes:
         yield ""
         return
-    for index in itertools.product(*(range(n) for n in sizes)):
+    for index in _counted(sizes):
         yield f"[{','.join(map(str, index))}]"
+
+
+def _counted(sizes: list[int]) -> Iterator[tuple[int, ...]]:
+    """Yield the indices one after the other: nothing of an array that is said to be huge is kept."""
+    if not sizes:
+        yield ()
+        return
+    for first in range(sizes[0]):
+        for rest in _counted(sizes[1:]):
+            yield first, *rest
