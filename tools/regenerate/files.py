@@ -18,6 +18,7 @@ from tools.regenerate import (
     matrix,
     pages,
     process_schemas,
+    retrofit_schema,
     tables,
 )
 from tools.regenerate.pages import ROOT
@@ -61,6 +62,7 @@ _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/conversion.schema.json", lambda _: conversion_schema.text()),
     Generated("specs/fit.schema.json", lambda _: process_schemas.fit_text()),
     Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
+    Generated("specs/retrofit.schema.json", lambda _: retrofit_schema.text()),
     *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "robustness", "bode")),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),

@@ -17,6 +17,7 @@ _END: Final = re.compile(
     re.IGNORECASE,
 )
 _AREA: Final = re.compile(r"^[\W_]*(?:(?:area|anlage|unit|plant|section|bereich)\W+)?(.*?)[\W_]*$", re.IGNORECASE)
+_HEADING: Final = re.compile(r"\W*(area|anlage|unit|plant|section|bereich|train)\b|[-=*#]{2,}", re.IGNORECASE)
 _TAG: Final = re.compile(r"[A-Za-z]{1,6}[A-Za-z0-9\-_./ ]*\d[\w\-./]*")
 _TELLING: Final[tuple[Field, ...]] = ("gain", "integral", "derivative", "system", "action", "pv_low", "pv_high", "mode", "scan")
 """Fields one of which a loop has beside its tag."""
@@ -106,6 +107,8 @@ def _kind(line: ListLine, layout: ListLayout) -> str:
         return "loop"
     if _END.match(line.text):
         return "note"
+    if len(line.cells) == 1 and _HEADING.match(line.text):
+        return "area"
     if tags and (telling or _TAG.fullmatch(tags[0])):
         return "loop"
     return "area" if len(line.cells) == 1 else "note"
