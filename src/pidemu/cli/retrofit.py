@@ -15,7 +15,7 @@ from pidemu.cli.common import OutputArgument, echo, heading, json_option, print_
 from pidemu.cli.outputs import check_outputs, inputs
 from pidemu.errors import ListError
 from pidemu.excerpt import printable_json, visible
-from pidemu.files.tables import counted, write_table
+from pidemu.files.tables import write_table
 from pidemu.files.writing import beside
 
 if TYPE_CHECKING:
@@ -90,7 +90,6 @@ def command(
     decided = Decisions() if decisions is None else read_decisions(decisions)
     read = inputs(*lists, mapping, rules, decisions)
     paths = {} if folder is None else _prepared(folder, workbook, read)
-    started = time.monotonic()
     result = _run(lists, ruled, words, decided)
     from pidemu.plant.document import job_document
 
@@ -101,8 +100,6 @@ def command(
         print_json(document)
     else:
         _print(result, ruled, paths)
-    rate = len(result.rows) / max(time.monotonic() - started, 1e-9)
-    echo(f"note: {counted(len(result.rows), 'loop')}, {rate:.0f} loops/s", err=True)
     waiting = result.summary.counts["decision"] + result.summary.counts["error"]
     if waiting:
         raise SystemExit(1)
@@ -203,6 +200,6 @@ def _print(result: RetrofitResult, rules: PlantRules, paths: dict[str, str]) -> 
         table(["written", ""], [[visible(path), _FILES[name]] for name, path in paths.items()])
         return
     lines = exception_report(result.rows, summary, rules.levels)[3:]
-    echo("\n".join(lines[:_SHOWN]))
+    echo("\n" + "\n".join(lines[:_SHOWN]))
     if len(lines) > _SHOWN:
         echo(f"... {len(lines) - _SHOWN} more lines; --out FOLDER writes everything")

@@ -58,8 +58,9 @@ def _told(part: Sequence[tuple[Finding, RetrofitRow]]) -> Iterator[str]:
     ordered = sorted(part, key=lambda x: (x[1].reading.mode not in _CASCADE, -x[0].measure, x[1].reading.tag, x[1].reading.line))
     for finding, row in ordered:
         r = row.reading
-        where = f"{r.file}{f' {r.sheet}' if r.sheet else ''} line {r.line}"
-        yield f"   {r.tag or '(no tag)'}  {finding.code}  {finding.text}  [{where}{f', {finding.place}' if finding.place else ''}]"
+        line = "" if finding.place.startswith("line ") else f"line {r.line}"
+        where = ", ".join(x for x in (r.file, r.sheet, line, finding.place) if x)
+        yield f"   {r.tag or '(no tag)'}  {finding.code}  {finding.text}  [{where}]"
         for choice in finding.choices:
             says = f": {choice.says}" if choice.says else ""
             yield f"      {choice.answer}{says}{f' -> {choice.outcome}' if choice.outcome else ''}"

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from pidemu.card.load import Card
 from pidemu.errors import ListError, PidemuError
+from pidemu.files.tables import counted
 from pidemu.plant.codes import CODES
 from pidemu.plant.converting import LoopConversion, as_ranged, convert_loop
 from pidemu.plant.decisions import SKIP, Decisions, note_decision, pass_over, read_decisions
@@ -66,7 +67,7 @@ class RetrofitSummary:
         exact = self.verdicts.get("exact", 0)
         return (
             f"{loops:,} loops: {self.counts['converted']:,} converted ({exact:,} exact), {self.counts['decision']:,} to decide, "
-            f"{self.counts['error']:,} errors; {self.counts['skipped']:,} other lines"
+            f"{counted(self.counts['error'], 'error')}; {counted(self.counts['skipped'], 'other line')}"
         )
 
 
