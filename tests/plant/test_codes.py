@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,6 +25,7 @@ ERRORS: list[tuple[str, Mapping[str, str]]] = [
     ("E-number", {"I": "1/4"}),
     ("E-number", {"I": "1-2"}),
     ("E-number", {"D": "2 .. 3"}),
+    ("E-number", {"D": "inf"}),
     ("E-number", {"LRV": "low"}),
     ("E-date", {"I": "06. Sep"}),
     ("E-date", {"I": "9/6/2026"}),
@@ -79,6 +81,7 @@ DECISIONS: list[tuple[str, Mapping[str, str]]] = [
     ("D-update", {"Update [s]": "0.5"}),
     ("D-zero-gain", {"P": "0"}),
     ("D-unused", {"P": "0", "I": "0"}),
+    ("D-unused", {"P": "0", "P unit": "PB", "I": "0", "D": "0"}),
     ("D-unused", {"Remarks": "spare"}),
     ("D-unused", {"Remarks": "out of service since 2019"}),
     ("D-default", {**FC19, "P": "1", "I": "0"}),
@@ -102,6 +105,7 @@ FLAGS: list[tuple[str, Mapping[str, str]]] = [
     ("F-unit-other", {"I": "30", "I unit": "s"}),
     ("F-unit-other", {"P": "50", "P unit": "PB"}),
     ("F-unit-other", {**TDC, "I": "0.5", "I unit": "rep/min"}),
+    ("F-td-ti", {"D": "20", "D unit": "s"}),
     ("F-td-ti", {**TDC, "D": "9", "D unit": "min"}),
     ("F-scan-slow", {"I": "20"}),
     ("F-filter-long", {"D": "0.1", "D unit": "min", "PV filter [s]": "20"}),
@@ -201,6 +205,14 @@ def test_units_in_the_mapping_come_before_the_cards_own(tmp_path: Path) -> None:
     assert (found.reading.origins["RESET"].unit_from, found.settings["RESET"]) == ("mapping", 30.0)
 
 
+def test_a_blank_unit_is_the_cards_own_where_its_options_only_scale_it(tmp_path: Path) -> None:
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text("words: {reverse: [falls]}\n", "utf-8")
+    row = {"System": "automationdirect/directlogic", "I": "45", "I unit": "", "Action": "falls"}
+    found = run_one(tmp_path, row, mapping=mapping)
+    assert (found.row_class, found.reading.codes, found.settings["RESET"]) == ("converted", ["F-unit-assumed"], 45.0)
+
+
 def test_a_blank_unit_can_be_asked_for(tmp_path: Path) -> None:
     mapping = tmp_path / "map.yaml"
     mapping.write_text("blank-units: ask\n", "utf-8")
@@ -241,10 +253,25 @@ def test_another_range_multiplies_the_gain_and_another_scale_does_not(tmp_path: 
 
 def test_every_code_has_a_test_and_an_explanation() -> None:
     elsewhere = {
-        "E-bits", "D-structure", "D-duplicate", "D-filter", "F-series-limit", "F-hidden-row", "F-rounding", "F-repeat",
+        "E-bits", "E-program", "D-structure", "D-duplicate", "D-filter", "F-series-limit", "F-hidden-row", "F-rounding", "F-repeat",
         "F-interval",
         "F-decided", "F-lowered",
     }  # fmt: skip
     assert {code for code, _ in (*ERRORS, *DECISIONS, *FLAGS)} | elsewhere == set(CODES)
     assert all(code.about.endswith(".") for code in CODES.values())
     assert all(code.answers for name, code in CODES.items() if name.startswith("D-"))
+
+
+def test_a_fault_of_pidemu_costs_its_own_loop_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from pidemu.plant import job
+
+    convert = job.convert_loop
+
+    def failing(reading: Any, *more: Any) -> Any:
+        if reading.tag == "TIC-1":
+            raise ZeroDivisionError("float division by zero")
+        return convert(reading, *more)
+
+    monkeypatch.setattr(job, "convert_loop", failing)
+    rows, _ = run(tmp_path, {}, {"Tag": "TIC-2"})
+    assert [(row.row_class, row.reading.codes) for row in rows] == [("error", ["E-program"]), ("converted", [])]

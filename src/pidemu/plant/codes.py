@@ -48,6 +48,7 @@ _CODES: Final = (
     Code("E-negative", "A setting is negative, and the card's range is not.", 3),
     Code("E-range", "A range whose low end is not below its high end, or a value outside the card's range.", 3),
     Code("E-bits", "The named bits of a Logix PID tag contradict its control word CTL.", 3),
+    Code("E-program", "pidemu failed on this loop, which is a fault of its own: report it with the line of the list.", 3),
     Code("D-refused", "The target cannot do what the source does; the nearest settings and their cost are stated.", 1,
     "nearest; skip"),
     Code("D-duplicate", "Another line has the same tag and other contents.", 2, "the line that counts, such as Sheet1:12, "

@@ -12,6 +12,7 @@ from pidemu.card.model.card_file import Equation
 from pidemu.conversion.convert import convert
 from pidemu.conversion.modes import depends_on_mode
 from pidemu.conversion.refused import ConversionRefusedError, QuestionError
+from pidemu.conversion.request import DIGITS
 from pidemu.conversion.result import Conversion
 from pidemu.errors import PidemuError
 from pidemu.plant.decisions import Decisions, note_decision
@@ -121,7 +122,7 @@ def _converted(source: Settings, target: Card, ruled: LoopRules, asked: dict[str
 def _asked(reading: LoopReading, rules: PlantRules, ruled: LoopRules, source: Settings) -> dict[str, Any]:
     """Return the arguments of a conversion that the list states."""
     goal = rules.scan_of(reading.tag)
-    asked: dict[str, Any] = {"action": reading.action, "digits": ruled.digits, "bias": reading.bias, "tag": reading.tag}
+    asked: dict[str, Any] = {"action": reading.action, "digits": ruled.digits or DIGITS, "bias": reading.bias, "tag": reading.tag}
     asked["compensate"] = rules.compensates and reading.scan is not None
     if reading.scan is not None:
         asked["scan"] = (reading.computes_with or reading.scan, goal or reading.scan)
@@ -317,10 +318,11 @@ def _note_times(reading: LoopReading, c: Conversion) -> None:
     if times is None:
         return
     ti, td = times
+    a = c.source.algorithm()
     if reading.scan is not None and reading.scan > ti / 10:
         text = f"executed every {reading.scan:g} s with an integral time of {ti:.4g} s: less than ten times"
         reading.find("F-scan-slow", text, measure=reading.scan / ti)
-    if td and td > ti / 4 and c.settings.equation.form.value == "series":
+    if a.kd and a.kd / a.kp > a.kp / a.ki / 4 and c.settings.equation.form.value == "series":
         reading.find("F-series-limit", f"the integral time, {ti:.4g} s, is less than four derivative times of {td:.4g} s")
     lag = reading.pv_filter or _own_filter(c.source)
     if td and lag > td:

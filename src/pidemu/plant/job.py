@@ -16,6 +16,7 @@ from pidemu.plant.converting import LoopConversion, as_ranged, convert_loop
 from pidemu.plant.decisions import SKIP, Decisions, note_decision, pass_over, read_decisions
 from pidemu.plant.layout import ListLayout, find_layout
 from pidemu.plant.lines import LoopLine, SkippedLine, skipped_sheet, split_sheet
+from pidemu.plant.loop_cells import LoopCells
 from pidemu.plant.mapping import PlantWords, read_mapping
 from pidemu.plant.outcomes import with_outcomes
 from pidemu.plant.reading import ask_structures, read_loop
@@ -221,9 +222,9 @@ def _readable(loop: LoopLine, layout: ListLayout, words: PlantWords, decisions: 
     def again(other: Decisions) -> LoopReading:
         try:
             return read_loop(loop, layout, words, other)
-        except PidemuError as error:  # a fault of one line costs no other
-            lost = LoopReading(layout.sheet.file, layout.sheet.name, loop.line.number, "")
-            lost.find("E-missing", f"the line cannot be read: {error}")
+        except Exception as error:  # a fault of one line costs no other
+            lost = LoopReading(layout.sheet.file, layout.sheet.name, loop.line.number, LoopCells(loop, layout).text("tag"))
+            lost.find("E-program", f"the line could not be read: {_shown(error)}")
             return lost
 
     return again(decisions), again
@@ -281,8 +282,16 @@ def attempt(reading: LoopReading, rules: PlantRules, decisions: Decisions) -> Lo
     for finding in list(reading.findings):
         if CODES[finding.code].level != "flag":
             reading.find("F-lowered", f"the rules let pass {finding.code}: {finding.text}", finding.place)
-    as_ranged(reading)
-    return convert_loop(reading, rules, decisions)
+    try:
+        as_ranged(reading)
+        return convert_loop(reading, rules, decisions)
+    except Exception as error:  # a fault of one loop costs no other
+        reading.find("E-program", f"the loop could not be converted: {_shown(error)}")
+        return None
+
+
+def _shown(error: Exception) -> str:
+    return str(error) if isinstance(error, PidemuError) else f"{type(error).__name__}: {error}"
 
 
 def _note_duplicates(readings: Sequence[LoopReading], decisions: Decisions) -> set[int]:

@@ -30,7 +30,9 @@ _OTHER_READING: Final = {
     "1/min": "1/s", "1/s": "1/min",
 }  # fmt: skip
 """What else a bare number could be."""
-_OFF: Final = ("off", "aus", "none", "-", "--", "inf", "infinite", "∞", "nil")
+_OFF: Final = ("off", "aus", "none", "-", "--", "nil")
+_NEVER: Final = ("inf", "infinite", "infinity", "∞")
+"""An integral time that is none."""
 _TIMES: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 _PER_REPEAT: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT, Dimension.REPEATS_PER_TIME)
 
@@ -100,6 +102,9 @@ def read_settings(reading: LoopReading, cells: LoopCells, words: PlantWords, dec
         found = _cell(reading, cells, setting, decisions)
         if found is not None:
             stated.cells[setting] = found
+    if _all_zero(stated):
+        reading.find("D-unused", "all settings are zero: nothing was ever set", cells.place("gain"))
+        return
     for option, choices in open_equations(card, stated.options):
         decided = _decided_choice(reading, words, decisions, "D-equation", option, choices)
         if decided:
@@ -119,6 +124,12 @@ def read_settings(reading: LoopReading, cells: LoopCells, words: PlantWords, dec
         _make(reading, card, stated, given)
 
 
+def _all_zero(stated: StatedLoop) -> bool:
+    """Whether gain and integral are stated, and every number is zero."""
+    numbers = [found.number for found in stated.cells.values()]
+    return len(numbers) >= 2 and all(number is not None and not number.value for number in numbers)
+
+
 def _cell(reading: LoopReading, cells: LoopCells, setting: Setting, decisions: Decisions) -> SettingCell | None:
     filled = cells.filled(setting)
     if not filled:
@@ -130,7 +141,7 @@ def _cell(reading: LoopReading, cells: LoopCells, setting: Setting, decisions: D
         both = " and ".join(f"{c.text} in {c.place} under '{k.header}'" for c, k in filled)
         reading.find("D-unit", f"two columns hold the {setting}: {both}. Which counts?", cell.place, cell.text)
         return None
-    if cell.text.casefold() in _OFF and setting != "gain":
+    if setting != "gain" and cell.text.casefold() in (*_OFF, *(_NEVER if setting == "integral" else ())):
         return SettingCell(cell, column, None, UnitReading(None, ""))
     try:
         number = cell_number(cell, cells.comma)
@@ -187,8 +198,11 @@ def _choose_units(reading: LoopReading, card: Card, stated: StatedLoop, words: P
             found = stated.cells[setting]
             unit = found.unit.unit or words.unit_for(card, setting)
             if unit is None:
-                if found.number is not None:
+                otherwise = len({is_reciprocal(role, parse_unit(own)) for own in units.values() if own}) > 1
+                if found.number is not None and (otherwise or words.written.blank_units == "ask"):
                     ask_unit(reading, setting, found.number, "no unit is stated", found.cell, [u for u in units.values() if u])
+                elif found.number is not None:
+                    stated.options[option] = card.variant({}).chosen[option]
                 continue
             same = [
                 c
@@ -340,20 +354,28 @@ def note_settings(reading: LoopReading, settings: Settings) -> None:
     law = settings.algorithm()
     if not law.ki and not {"D-no-integral", "D-unused", "D-zero-gain"} & set(reading.codes):
         reading.find("D-no-integral", "there is no integral action")
-    if law.ki and law.kd and law.kp:
-        times = _times(settings)
-        if times is not None and times[1] > times[0]:
-            reading.find("F-td-ti", f"the derivative time, {times[1]:g} s, is longer than the integral time, {times[0]:g} s")
-
-
-def _times(settings: Settings) -> tuple[float, float] | None:
-    """Return integral and derivative time as the law has them: kp/ki and kd/kp [s]."""
-    law = settings.algorithm()
-    if not (law.ki and law.kp):
-        return None
-    return law.kp / law.ki, law.kd / law.kp
+    times = times_of(settings)
+    if times is not None and times[1] > times[0]:
+        reading.find("F-td-ti", f"the derivative time, {times[1]:g} s, is longer than the integral time, {times[0]:g} s")
 
 
 def times_of(settings: Settings) -> tuple[float, float] | None:
-    """Return integral and derivative time [s]; ``None`` without gain or integral action."""
-    return _times(settings)
+    """Return integral and derivative time [s], those on the dials, or of gains of their own those that these amount to.
+
+    Parameters
+    ----------
+    settings : Settings
+        The settings.
+
+    Returns
+    -------
+    tuple of float or None
+        ``None`` without gain or integral action.
+    """
+    law = settings.algorithm()
+    if not (law.ki and law.kp):
+        return None
+    integral, derivative = settings.by_role(Role.INTEGRAL), settings.by_role(Role.DERIVATIVE)
+    if settings.equation.form is Form.PARALLEL or integral is None:
+        return law.kp / law.ki, law.kd / law.kp
+    return 1 / integral.canonical, 0.0 if derivative is None else derivative.canonical
