@@ -13,56 +13,25 @@ from pidemu.plant.sources import read_sources
 from tests.plant.lists import FC19, HEADER, PLC, TDC, UDC, YOKOGAWA, write_list
 
 NUMBERS = (
-    "", "0", "1", "2.5", "2,5", "1e300", "-1e-300", "nan", "inf", "-inf", "∞", "off", "1.5?", "~2", "1/2", "06. Sep", "12:30", "1 000",
-    "1.234.567,8", "1e999", "0x10", "۳", "٣,٥", "²", "1e", "+", "-", ".", ",", "= 2", "2 min", "2 %", "2 rep/min", "2 barg", "9" * 400,
+    "", "0", "1", "2.5", "2,5", "1e300", "-1e-300", "nan", "inf", "-inf", "∞", "off", "1.5?", "~2", "1/2", "06. Sep",
+    "12:30", "1 000",
+    "1.234.567,8", "1e999", "0x10", "۳", "٣,٥", "²", "1e", "+", "-", ".", ",", "= 2", "2 min", "2 %", "2 rep/min", "2 barg",
+    "9" * 400,
 )  # fmt: skip
 UNITS = (
-    "",
-    "gain",
-    "PB",
-    "%",
-    "%/%",
-    "eu/eu",
-    "%/eu",
-    "rep/min",
-    "min",
-    "min/rep",
-    "s",
-    "ms",
-    "h",
-    "1/s",
-    "1/min",
-    "rep/s",
-    "m",
-    "r",
-    "?",
-    "x",
-)
+    "", "gain", "PB", "%", "%/%", "eu/eu", "%/eu", "rep/min", "min", "min/rep", "s", "ms", "h", "1/s", "1/min", "rep/s", "m",
+    "r", "?", "x",
+)  # fmt: skip
 WORDS = (
-    "",
-    "?",
-    "ideal",
-    "EQA",
-    "PID A",
-    "dependent",
-    "PV",
-    "error",
-    "K=2",
-    "K=x",
-    "FORM=ideal",
-    "reverse",
-    "D",
-    "CAS",
-    "MAN",
-    "Y",
-    "N",
-    "\u202e",
-    "=1+1",
-    "a\nb",
-)
+    "", "?", "ideal", "EQA", "PID A", "dependent", "PV", "error", "K=2", "K=x", "FORM=ideal", "reverse", "D", "CAS", "MAN",
+    "Y", "N",
+    "\u202e", "=1+1", "a\nb",
+)  # fmt: skip
 SYSTEMS = (
-    "fisher/provox", "foxboro/ia-pid", "honeywell/tdc3000", "honeywell/udc", "bailey/fc19", "bailey/fc18", "yokogawa/fieldbus-pid",
-    "allen-bradley/plc5", "allen-bradley/logix-pid", "allen-bradley/pide", "automationdirect/directlogic", "toshiba/pid3", "emerson/deltav",
+    "fisher/provox", "foxboro/ia-pid", "honeywell/tdc3000", "honeywell/udc", "bailey/fc19", "bailey/fc18",
+    "yokogawa/fieldbus-pid",
+    "allen-bradley/plc5", "allen-bradley/logix-pid", "allen-bradley/pide", "automationdirect/directlogic", "toshiba/pid3",
+    "emerson/deltav",
     "generic/dahlin", "generic/parallel", "epics/epid", "acme", "", "../../etc/passwd", "fisher",
 )  # fmt: skip
 NUMERIC = ("P", "I", "D", "PV filter [s]", "LRV", "URV", "New LRV", "New URV", "OP lo", "OP hi", "Update [s]", "Scan [s]")

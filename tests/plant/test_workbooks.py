@@ -167,6 +167,40 @@ def test_a_workbook_that_is_cut_off_is_refused(keep: int, tmp_path: Path) -> Non
     refused(tmp_path / "cut.xlsx", data[:keep], r"^cut\.xlsx: a damaged workbook")
 
 
+def test_compressed_data_that_is_damaged_is_refused(tmp_path: Path) -> None:
+    data = bytearray(write(tmp_path / "list.xlsx", [list(HEADER), cells()]).read_bytes())
+    at = data.index(b"xl/worksheets/sheet1.xml") + 60
+    data[at : at + 40] = bytes(range(40))
+    refused(tmp_path / "x.xlsx", bytes(data), r"^x\.xlsx: a damaged workbook")
+
+
+def ods(rows: str) -> bytes:
+    parts = (("office", "office"), ("table", "table"), ("text", "text"), ("xlink", "xlink"))
+    names = "".join(f' xmlns:{short}="urn:oasis:names:tc:opendocument:xmlns:{name}:1.0"' for short, name in parts)
+    sheet = f'<office:spreadsheet><table:table table:name="Loops">{rows}</table:table></office:spreadsheet>'
+    content = f"<office:document-content{names}><office:body>{sheet}</office:body></office:document-content>"
+    manifest = '<manifest:manifest xmlns:manifest="urn:oasis:names:tc:opendocument:xmlns:manifest:1.0"></manifest:manifest>'
+    kind = "application/vnd.oasis.opendocument.spreadsheet"
+    return packed({"mimetype": kind.encode(), "META-INF/manifest.xml": manifest.encode(), "content.xml": content.encode()})
+
+
+def ods_row(texts: list[str], more: str = "") -> str:
+    found = "".join(f'<table:table-cell office:value-type="string"><text:p>{text}</text:p></table:table-cell>' for text in texts)
+    return f"<table:table-row{more}>{found}</table:table-row>"
+
+
+def test_an_ods_file_is_read_with_its_hidden_rows(tmp_path: Path) -> None:
+    path = tmp_path / "list.ods"
+    path.write_bytes(ods(ods_row(list(HEADER)) + ods_row(LOOP) + ods_row(["TIC-2", *LOOP[1:]], ' table:visibility="collapse"')))
+    assert [(row.reading.line, row.reading.codes) for row in rows_of(path)] == [(2, []), (3, ["F-hidden-row"])]
+
+
+def test_an_ods_file_that_repeats_its_cells_a_million_times_is_refused(tmp_path: Path) -> None:
+    cell = '<table:table-cell table:number-columns-repeated="16384" office:value-type="float" office:value="1"/>'
+    wide = f'<table:table-row table:number-rows-repeated="1048576">{cell}'
+    refused(tmp_path / "x.ods", ods(ods_row(list(HEADER)) + wide + "</table:table-row>"), "rows and 16,384 columns are more")
+
+
 def test_a_zip_without_a_workbook_is_refused(tmp_path: Path) -> None:
     refused(tmp_path / "x.xlsx", packed({"a.txt": b"hello"}), "a zip archive without a workbook in it")
 

@@ -31,8 +31,8 @@ def converted_columns(rows: Sequence[RetrofitRow]) -> list[str]:
     targets = list(dict.fromkeys(name for row in rows for name in row.settings))
     source = [f"source {letter}{what}" for letter, _ in _PARTS for what in ("", " as found", " unit")]
     return [
-        "tag", "service", "area", "source card", "source options", *source, "PV filter [s]", *targets, "pasted by units alone",
-        "verdict",
+        "tag", "service", "area", "source card", "source options", *source, "PV filter [s]", *targets, "target units",
+        "pasted by units alone", "verdict",
         "in words", "loop-band deviation [%]", "kick before", "kick after", "gain factor", "PV range", "new PV range",
         "action", "scan [s]",
         "flags", "remarks", "decided by", "file", "sheet", "row", "number",
@@ -61,6 +61,7 @@ def converted_values(row: RetrofitRow, number: int) -> dict[str, Any]:
         "source options": ", ".join(f"{n} {x}" for n, x in c.source.options.items()),
         "PV filter [s]": r.pv_filter or None,
         **row.settings,
+        "target units": ", ".join(f"{n} {v.unit}" for n, v in c.settings.items() if v.active and v.unit != "1"),
         "pasted by units alone": ", ".join(f"{n} {x:.5g}" for n, x in row.converted.pasted.items()),
         "verdict": c.verdict,
         "in words": _VERDICTS.get(c.verdict, c.verdict),

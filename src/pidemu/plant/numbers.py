@@ -8,8 +8,8 @@ from typing import Final, Literal
 
 from pidemu.plant.cells import ListCell
 
-_NUMBER: Final = re.compile(r"([-+]?(?:\d{1,3}(?: \d{3})+|\d+)?(?:[.,]\d+)*[.,]?(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
-_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+_NUMBER: Final = re.compile(r"([-+]?(?:\d{1,3}(?: \d{3})+|\d+)?(?:[.,]\d+)*[.,]?(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL | re.ASCII)
+_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _MONTHS: Final = "jan|feb|mar|mär|mrz|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez"
 _DATE: Final = re.compile(
     rf"\d{{4}}-\d\d?-\d\d?.*|\d{{1,2}}[./]\d{{1,2}}[./]\d{{2,4}}|\d{{1,2}}[ .\-/]+({_MONTHS})\w*\.?([ .\-/]+\d{{2,4}})?"

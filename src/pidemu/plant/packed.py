@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -64,7 +65,7 @@ def hidden_parts(data: bytes, file: str) -> dict[str, HiddenParts]:
                 return _of_ods(archive, file)
             if "xl/workbook.xml" in names:
                 return {sheet: _of_sheet(archive, part, file) for sheet, part in _sheet_parts(archive, file) if part in names}
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, OSError) as error:
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, OSError, zlib.error) as error:
         raise ListError(f"{file}: a damaged workbook ({error}); open it and save it again") from None
     raise ListError(f"{file}: a zip archive without a workbook in it; give the list as CSV, xlsx, xls, ods or L5X")
 
