@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from pidemu.plant.codes import CODES
+from pidemu.plant.converting import convert_loop
 from tests.plant.lists import FC19, PLC, TDC, UDC, YOKOGAWA, run, run_one
 
 ERRORS: list[tuple[str, Mapping[str, str]]] = [
@@ -174,6 +175,33 @@ def test_a_filter_goes_along_where_the_target_has_a_place_for_it(tmp_path: Path)
     assert found.to_dict()["figures"]["lag_on_pv"] == 3.0
 
 
+MOMENTS = "match: exact-else-low-frequency\noptions: {STRUCTURE: match-source}\n"
+
+
+@pytest.mark.parametrize("row", [
+    {**YOKOGAWA, "D": "10", "D unit": "s", "PV filter [s]": "3"},
+    {"System": "foxboro/ia-pid", "P": "50", "P unit": "PB", "I unit": "min", "D": "0.3", "D unit": "min", "PV filter [s]": "3"},
+])  # fmt: skip
+def test_a_filter_is_not_absorbed_into_the_dials(row: Mapping[str, str], tmp_path: Path) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text(f"target: emerson/deltav\n{MOMENTS}", "utf-8")
+    with_it, without = (run_one(tmp_path, {**row, **more}, target=None, rules=rules) for more in ({}, {"PV filter [s]": ""}))
+    assert with_it.settings["PV_FTIME"] == 3.0
+    assert {**with_it.settings, "PV_FTIME": 0.0} == without.settings
+    rules.write_text("target: allen-bradley/pide\nmatch: exact-else-low-frequency\npv-filter: in front\n", "utf-8")
+    in_front = run_one(tmp_path, row, target=None, rules=rules)
+    assert in_front.to_dict()["figures"]["lag_on_pv"] == 3.0
+    rules.write_text("target: allen-bradley/pide\nmatch: exact-else-low-frequency\n", "utf-8")
+    assert "D-filter" in run_one(tmp_path, row, target=None, rules=rules).reading.codes
+
+
+def test_choices_of_one_letter_are_words_of_their_option(tmp_path: Path) -> None:
+    row = {"System": "foxboro/ia-pid", "P": "50", "P unit": "PB", "I": "2", "I unit": "min"}
+    stated = [run_one(tmp_path, {**row, "Form": mode}).reading.stated for mode in ("P", "PI", "I", "PID", "")]
+    assert stated == [{"MODOPT": "P"}, {"MODOPT": "PI"}, {"MODOPT": "I"}, {"MODOPT": "PID"}, {}]
+    assert run_one(tmp_path, {**row, "Form": "P"}).reading.codes == ["D-no-integral"]
+
+
 def test_a_negative_gain_is_none_where_the_card_allows_it(tmp_path: Path) -> None:
     row = {"System": "iec/61131-3-pid", "P": "-2", "I": "15", "I unit": "s", "Action": "direct"}
     assert "E-negative" not in run_one(tmp_path, row).reading.codes
@@ -263,15 +291,11 @@ def test_every_code_has_a_test_and_an_explanation() -> None:
 
 
 def test_a_fault_of_pidemu_costs_its_own_loop_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from pidemu.plant import job
-
-    convert = job.convert_loop
-
     def failing(reading: Any, *more: Any) -> Any:
         if reading.tag == "TIC-1":
             raise ZeroDivisionError("float division by zero")
-        return convert(reading, *more)
+        return convert_loop(reading, *more)
 
-    monkeypatch.setattr(job, "convert_loop", failing)
+    monkeypatch.setattr("pidemu.plant.job.convert_loop", failing)
     rows, _ = run(tmp_path, {}, {"Tag": "TIC-2"})
     assert [(row.row_class, row.reading.codes) for row in rows] == [("error", ["E-program"]), ("converted", [])]

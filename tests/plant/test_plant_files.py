@@ -8,10 +8,10 @@ import pytest
 
 from pidemu.card.library import load_card
 from pidemu.errors import ListError
-from pidemu.plant.converting import matching_choice
 from pidemu.plant.decisions import read_decisions
 from pidemu.plant.draft import draft_mapping
 from pidemu.plant.mapping import PlantWords, read_mapping
+from pidemu.plant.match_source import matching_choice
 from pidemu.plant.rules import loop_type, read_rules
 from pidemu.plant.sources import read_sources
 from tests.plant.lists import TDC, run_one, write_list

@@ -102,6 +102,12 @@ def pass_over(reading: LoopReading, decisions: Decisions) -> None:
             note_decision(reading, found)
 
 
+def is_nearest_wanted(reading: LoopReading, decisions: Decisions) -> bool:
+    """Whether a person accepts the nearest settings where the target refuses, or where the deviation is beyond what is allowed."""
+    found = decisions.answer(reading.tag, "D-refused")
+    return found is not None and found.answer.casefold() == "nearest"
+
+
 def note_decision(reading: LoopReading, decision: Decision) -> None:
     """Write down that a decision was used."""
     if decision in reading.decisions:

@@ -77,8 +77,7 @@ class OptionVocabulary:
             for choice in choices:
                 yield f"{option} {choice}", option, choice
                 yield f"{option}={choice}", option, choice
-                if not choice.isdigit() and len(choice) > 1:
-                    yield choice, option, choice
+                yield choice, option, choice
         for table in (_WORDS, self._by_card):
             for option, words in table.get(card.id, {}).items():
                 for choice, spellings in words.items():

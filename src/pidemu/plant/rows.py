@@ -84,7 +84,7 @@ class RetrofitRow:
             "options": self.options,
             "units": {} if c is None else {n: v.unit for n, v in c.settings.items() if v.active},
             "verdict": self.verdict,
-            "figures": None if c is None else _figures(c),
+            "figures": None if c is None or self.converted is None else _figures(self.converted),
             "pasted": {} if c is None or self.converted is None else dict(self.converted.pasted),
             "held": {} if c is None or self.converted is None else dict(self.converted.options),
             "action": None if c is None else c.action_text,
@@ -163,7 +163,8 @@ def _source(r: LoopReading) -> dict[str, Any]:
     }
 
 
-def _figures(c: Conversion) -> dict[str, Any]:
+def _figures(converted: LoopConversion) -> dict[str, Any]:
+    c = converted.conversion
     band, kick = c.certificate.headline.loop_band, c.certificate.setpoint_kick
     return {
         "match": c.match,
@@ -173,5 +174,5 @@ def _figures(c: Conversion) -> dict[str, Any]:
         "kick_before": kick.source,
         "kick_after": kick.target,
         "gain_factor": c.factor,
-        "lag_on_pv": c.settings.lag,
+        "lag_on_pv": converted.lag,
     }
