@@ -174,3 +174,10 @@ def test_words_of_the_small_plant_say_what_they_mean() -> None:
     tdc = load_card("honeywell/tdc3000")
     assert [words.options.meaning(tdc, w) for w in ("NONINTER", "EQB", "nonsense")] == [("FORM", "ideal"), ("CTEQN", "B"), None]
     assert [words.actions.meaning(w) for w in ("INC-DEC", "d", "?")] == ["reverse", "direct", None]
+
+
+def test_the_mapping_names_the_system_of_a_sheet_that_names_none(tmp_path: Path) -> None:
+    file = tmp_path / "map.yaml"
+    file.write_text('sheet-systems: {"*": fisher/provox}\n', "utf-8")
+    found = run_one(tmp_path, {"System": ""}, mapping=file)
+    assert (found.row_class, found.reading.system) == ("converted", "fisher/provox")

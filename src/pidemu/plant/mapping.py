@@ -37,6 +37,9 @@ class MappingFile(Model):
         description="reverse and direct: the words for the action; other names: choices of options and the words for them. "
         "A text is a remark.",
     )
+    sheet_systems: dict[Text, Text] = Field(
+        default={}, description="By sheet (* for all): the system of loops for which the list names none."
+    )
     options: dict[Text, dict[Text, dict[Text, Spellings]]] = Field(
         default={}, description="By card, option and choice: the words for the choice."
     )
@@ -110,6 +113,10 @@ class PlantWords:
         """Return the unit that the mapping states for a card; ``None`` where it states none."""
         text = self.written.units.get(card.id, {}).get(setting)
         return None if text is None else unit_of(setting, text) or text
+
+    def system_of(self, sheet: str) -> str:
+        """Return the system of loops of a sheet that names none; empty where the mapping does not say it either."""
+        return self.written.sheet_systems.get(sheet, self.written.sheet_systems.get("*", ""))
 
     def columns_of(self, sheet: str) -> Mapping[str, str]:
         """Return the fields of a sheet's columns that the mapping names."""

@@ -53,7 +53,7 @@ def read_loop(loop: LoopLine, layout: ListLayout, words: PlantWords, decisions: 
         cells.text("tag"),
         cells.text("service"),
         cells.text("area") or loop.area,
-        cells.text("system"),
+        cells.text("system") or words.system_of(layout.sheet.name),
         contents=cells.contents,
     )
     if loop.line.hidden:
@@ -95,7 +95,8 @@ def _read_card(reading: LoopReading, cells: LoopCells, words: PlantWords) -> Non
         return
     if reading.card is None:
         what = f"'{reading.system}' is not a card, nor a word of the mapping" if reading.system else "the system is blank"
-        text = f"{what}; name it in the mapping under systems: (pidemu cards lists the cards)"
+        where = "systems:" if reading.system else "sheet-systems:"
+        text = f"{what}; name it in the mapping under {where} (pidemu cards lists the cards)"
         reading.find("E-card", text, cells.place("system"), reading.system)
 
 
