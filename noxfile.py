@@ -8,7 +8,7 @@ import nox
 
 PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
 PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
-EXTRAS = ("plot", "loop", "report", "fast", "cluster", "parquet")
+EXTRAS = ("plot", "loop", "report", "fast", "cluster", "parquet", "retrofit")
 """What is optional for users."""
 WITHOUT_EXTRAS = (
     "pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100", "jsonschema>=4.20", "simple-pid==2.0.1", "advanced-pid==0.0.8",

@@ -29,7 +29,7 @@ SLOW: Final = (
     "test_docs_fleet.py", "test_doctests.py", "controller/test_controller.py", "backends/test_choice.py",
     "controller/test_faults.py", "law/test_law.py", "controller/test_modes.py", "test_packaging.py", "report/test_plots.py",
     "law/test_power_series.py", "settings/test_settings.py", "controller/test_transfers.py", "test_types.py",
-    "tuning/test_rules.py",
+    "plant/test_any_cells.py", "plant/test_codes.py", "plant/test_outputs.py", "plant/test_small_list.py", "tuning/test_rules.py",
     "test_worked_examples.py",
 )  # fmt: skip
 """Files of more than about three seconds, and folders of which no file is fast."""

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         EngineError,
         FitRefusedError,
         FleetError,
+        ListError,
         PidemuError,
         ProcessError,
         RecordError,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from pidemu.fleet.result import FleetResult
     from pidemu.fleet.table import LoopTable, read_loops
     from pidemu.law.law import Law
+    from pidemu.plant.job import retrofit
     from pidemu.process.batch import test_batch
     from pidemu.process.fit.fit import ProcessFit, fit_process
     from pidemu.process.process import Process
@@ -87,6 +89,7 @@ _HOMES = {
     "EngineError": "errors",
     "FitRefusedError": "errors",
     "FleetError": "errors",
+    "ListError": "errors",
     "PidemuError": "errors",
     "ProcessError": "errors",
     "QuestionError": "conversion.refused",
@@ -110,6 +113,7 @@ _HOMES = {
     "fit_process": "process.fit.fit",
     "half_rule": "process.reduction",
     "relay_test": "process.relay",
+    "retrofit": "plant.job",
     "test_batch": "process.batch",
     "Record": "records.files",
     "read_record": "records.files",
@@ -148,6 +152,7 @@ __all__ = [
     "FleetError",
     "FleetResult",
     "Law",
+    "ListError",
     "Loop",
     "LoopTable",
     "OptimalTuning",
@@ -187,6 +192,7 @@ __all__ = [
     "read_record",
     "readings",
     "relay_test",
+    "retrofit",
     "robustness",
     "simulate",
     "test_batch",

@@ -14,6 +14,7 @@
     ├── FleetError           a fleet of loops cannot be read or run as asked
     ├── RecordError          a recorded signal file cannot be used
     │   └── FitRefusedError  a record tells nothing about the process
+    ├── ListError            a loop list, its mapping, the plant's rules or decisions cannot be used
     ├── CertificateError     a file is not the certificate of a conversion, so that it cannot be verified
     ├── ProcessError         a process model cannot be one, or a controller cannot close a loop with it
     ├── TuningError          a tuning rule is unknown, or does not serve this process
@@ -161,6 +162,10 @@ class RecordError(PidemuError):
 
 class FitRefusedError(RecordError):
     """A record tells nothing, or nothing true, about the process: no bump, no answer, a closed loop."""
+
+
+class ListError(PidemuError):
+    """A loop list cannot be read, or its mapping, the plant's rules or decisions cannot be used."""
 
 
 class CertificateError(PidemuError):

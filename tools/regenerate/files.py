@@ -18,6 +18,7 @@ from tools.regenerate import (
     matrix,
     pages,
     process_schemas,
+    retrofit_schema,
     tables,
     vectors_schema,
 )
@@ -64,6 +65,7 @@ _WHOLE: Final[tuple[Generated, ...]] = (
     Generated("specs/relay.schema.json", lambda _: process_schemas.relay_text()),
     *(Generated(f"specs/{name}.schema.json", partial(_schema, name)) for name in ("tuning", "optimum", "robustness", "bode")),
     Generated("specs/vectors.schema.json", lambda _: vectors_schema.text()),
+    Generated("specs/retrofit.schema.json", lambda _: retrofit_schema.text()),
     Generated("docs/emulation.md", lambda _: emulation.text()),
     Generated("docs/matrix.csv", lambda _: matrix.table()),
     Generated("docs/matrix.md", lambda _: matrix.page()),

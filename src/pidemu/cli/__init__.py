@@ -29,6 +29,7 @@ _COMMANDS: Final = {
     "robustness": "How far gain and dead time may change: the robustness plot.",
     "bode": "A loop over frequency: Bode, Nyquist, gang of four.",
     "fleet": "Run a file of closed loops, on all cores or on a cluster.",
+    "retrofit": "Convert a plant's loop lists, every line accounted for.",
     "matrix": "Convert typical settings of every card to every card.",
     "verify": "Compute a signed certificate again, and say what changed.",
     "code": "Print the scan program of a card with its settings.",

@@ -90,7 +90,7 @@ def read_text(
         character: with line and column.
     """
     name = visible(str(path) if shown is None else shown)
-    data = _bytes(path, name, error, kind)
+    data = read_bytes(path, error, kind, shown=name)
     other = other_kind(data)
     if other is not None:
         _refuse(error, name, f"{other}, not {kind.name}; {kind.remedy}")
@@ -143,7 +143,15 @@ def reason(fault: OSError | ValueError) -> str:
     return "no file can have this name"  # NUL in it, or half a Unicode pair
 
 
-def _bytes(path: str | Path, name: str, error: type[PidemuError], kind: Kind) -> bytes:
+def read_bytes(path: str | Path, error: type[PidemuError], kind: Kind, *, shown: str | None = None) -> bytes:
+    """Return a file as it is; see `read_text` for the arguments.
+
+    Raises
+    ------
+    PidemuError
+        Of the class `error`: the file cannot be read, or is too large.
+    """
+    name = visible(str(path) if shown is None else shown)
     try:
         mode = os.stat(path).st_mode
         if stat.S_ISDIR(mode):

@@ -117,7 +117,7 @@ def split_row(line: str, delimiter: str = ",") -> list[str]:
         if "limit" in str(error):
             raise ValueError(f"a cell has more than {csv.field_size_limit():,} characters; shorten it") from None
         raise ValueError(f"not a row of a CSV file ({error}); save the table as CSV text") from None
-    return [_untouched(cell.strip(" ")) for cell in cells]
+    return [untouched(cell.strip(" ")) for cell in cells]
 
 
 def text_cell(value: Any) -> Any:
@@ -186,7 +186,8 @@ def write_table(
         write_rows(stream, ([row.get(name) for name in header] for row in rows), "\r\n")
 
 
-def _untouched(cell: str) -> str:
+def untouched(cell: str) -> str:
+    """Return a cell as it was before `text_cell`."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
