@@ -6,17 +6,14 @@ import itertools
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pydantic import ValidationError
-
-from pidemu.card.document import Document, Path_, parse_file
-from pidemu.card.model.base import Evidence, Status
+from pidemu.card.document import Document, Path_
+from pidemu.card.model.base import Evidence, Status, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation, Setting
 from pidemu.card.references import makes_the_law, named_settings
-from pidemu.card.validation import problems
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import is_hidden
 
@@ -30,7 +27,7 @@ MOST_COMBINATIONS: Final = 200
 """Combinations of options, all of which are checked."""
 _LONGEST_ID: Final = 200
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
-EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
+EQUATION_KEYS = tuple(hyphenated(f.name) for f in fields(Equation))
 
 
 def overlay(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -344,10 +341,9 @@ def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]
         best = max(range(len(homes)), key=lambda i: (held[i], i if held[i] else -i))
         return (*homes[best], *path)
 
-    try:
-        return Equation.model_validate(raw)
-    except ValidationError as error:
-        raise CardError(capped(problems(error, raw, Equation, document, locate))) from None
+    from pidemu.card.validation import validated
+
+    return validated(Equation, raw, document, locate)
 
 
 def _refuse_wrong_references(variant: Variant) -> None:
@@ -382,10 +378,9 @@ def card_from(document: Document, card_id: str) -> Card:
     """
     if "card" not in document.value:  # what another file holds is not told
         raise CardError([document.problem((), "missing key 'card'")])
-    try:
-        data = CardFile.model_validate(document.value)
-    except ValidationError as error:
-        raise CardError(capped(problems(error, document.value, CardFile, document, lambda p: p))) from None
+    from pidemu.card.validation import validated
+
+    data = validated(CardFile, document.value, document)
     card = Card(card_id, data, document)
     found: list[Problem] = []
     for name, option in data.options.items():
@@ -399,9 +394,9 @@ def card_from(document: Document, card_id: str) -> Card:
         )
         raise CardError([document.problem(("options",), message, at_key=True)])
     for name, option in data.options.items():
-        for choice, fields in option.choices.items():
+        for choice, changed in option.choices.items():
             where = ("options", name, "choices", choice)
-            unknown = [key for key in fields if key not in EQUATION_KEYS]
+            unknown = [key for key in changed if key not in EQUATION_KEYS]
             found += [
                 document.problem((*where, key), f"unknown key '{key}'{suggest(key, EQUATION_KEYS)}", at_key=True) for key in unknown
             ]
@@ -437,7 +432,9 @@ def load_file(file: Path, card_id: str | None = None, shown: str | None = None) 
     wrong = wrong_id(card_id)
     if wrong is not None:
         raise CardError([Problem(shown or str(file), 1, 1, wrong)])
-    return card_from(parse_file(file, shown), card_id)
+    from pidemu.card.reading import parse_file
+
+    return card_from(parse_file(path, shown or str(file)), card_id)
 
 
 def wrong_id(card_id: str) -> str | None:

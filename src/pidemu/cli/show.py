@@ -15,7 +15,7 @@ from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
 from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
-from pidemu.card.model.base import Evidence
+from pidemu.card.model.base import Evidence, as_written
 from pidemu.card.model.card_file import Example, Setting
 from pidemu.card.references import is_active
 from pidemu.cli.common import (
@@ -232,6 +232,6 @@ def _plain(variant: Variant) -> dict[str, object]:
         "options": dict(variant.chosen),
         "equation": equation_lines(variant),
         "behaviour": dict([*scan_rows(q), *limit_rows(q), *mode_rows(q)]),
-        "content": json_safe(card.data.model_dump(mode="python", by_alias=True, exclude_none=True)),
+        "content": json_safe(as_written(card.data)),
         "assumed": [a.path for a in variant.assumptions()],
     }
