@@ -11,7 +11,8 @@ import pytest
 import pidemu
 from pidemu.arrays import Floats
 from pidemu.backends import native
-from pidemu.backends.choice import ENGINES, Engine, block, has_numba
+from pidemu.backends.choice import block, has_numba
+from pidemu.backends.names import ENGINES, Engine
 from pidemu.backends.python import compiled, starting
 from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible

@@ -22,10 +22,10 @@ import numpy.typing as npt
 
 from pidemu.arrays import Floats
 from pidemu.backends.c import library
-from pidemu.backends.cache import folder, keep, load
 from pidemu.backends.python import in_precision
 from pidemu.backends.runner import Run, Runner
 from pidemu.errors import EngineError
+from pidemu.files.cache import folder, keep, load
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 

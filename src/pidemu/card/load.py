@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pidemu.card.document import Document, Path_
+from pidemu.card import store
+from pidemu.card.document import CARD, Document, Path_, digest_of
 from pidemu.card.model.base import Evidence, Status, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation, Setting
 from pidemu.card.references import makes_the_law, named_settings
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
-from pidemu.excerpt import is_hidden
+from pidemu.excerpt import is_hidden, visible
+from pidemu.files.reading import read_text
 
 if TYPE_CHECKING:
     from pidemu.settings.settings import Settings
@@ -197,11 +201,14 @@ class Card:
         What the card says.
     document : Document
         The file, with places.
+    compiled : Compiled or None
+        Its plain data, where it was not read from its file.
     """
 
     id: str
     data: CardFile
     document: Document = field(repr=False)
+    compiled: store.Compiled | None = field(default=None, repr=False, compare=False)
     _variants: dict[tuple[str, ...], Variant] = field(default_factory=dict, repr=False, compare=False)
 
     def __hash__(self) -> int:
@@ -280,6 +287,8 @@ class Card:
         raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
         if isinstance(raw.get("settings"), dict):  # dials that choices add stand in their usual place, not at the end
             raw["settings"] = dict(sorted(raw["settings"].items(), key=_usual_place))
+        if self.compiled is not None:
+            return Variant(self, chosen, self.compiled.equation(tuple(chosen.values())), raw)
         variant = Variant(self, chosen, _equation(raw, self.document, chosen), raw)
         _refuse_wrong_references(variant)
         return variant
@@ -425,16 +434,48 @@ def load_file(file: Path, card_id: str | None = None, shown: str | None = None) 
     Raises
     ------
     CardError
-        See `card_from` and `parse_file`; or its name cannot be an id.
+        See `card_from` and `pidemu.card.reading.parse`; or its name cannot be an id.
     """
     path = Path(os.path.realpath(file))  # which also says something of links that go round
     card_id = card_id or f"{path.parent.name}/{path.stem}"
     wrong = wrong_id(card_id)
     if wrong is not None:
         raise CardError([Problem(shown or str(file), 1, 1, wrong)])
-    from pidemu.card.reading import parse_file
+    name = visible(shown or str(file))
+    text = read_text(path, CardError, CARD, shown=name)
+    compiled = store.find(digest_of(text))
+    if compiled is not None:
+        document = Document(name, (), compiled.value, digest=digest_of(text), unread=path)
+        return Card(card_id, compiled.data, document, compiled)
+    from pidemu.card.reading import parse
 
-    return card_from(parse_file(path, shown or str(file)), card_id)
+    return card_from(parse(text, name), card_id)
+
+
+def status_counts(card: Card) -> dict[str, int]:
+    """Return how many fields of the default variant have each status."""
+    found = Counter(s.evidence.status for s in card.variant().statements() if s.evidence)
+    return {s.value: found[s] for s in Status}
+
+
+def compiled(card: Card) -> tuple[store.Compiled, dict[str, Any]]:
+    """Return a card as plain data, and what it says of itself in short.
+
+    Raises
+    ------
+    CardError
+        Two choices, each fine by itself, do not go together.
+    """
+    equations = {tuple(variant.chosen.values()): variant.equation for variant in variants(card)}
+    short = {"title": card.title, "status": status_counts(card)}
+    return store.Compiled.of(card.document.value, card.data, equations), short
+
+
+def keep(card: Card) -> None:
+    """Keep a card compiled, for the next time that it is loaded; it must be known to be right."""
+    if card.compiled is None:
+        with contextlib.suppress(CardError):
+            store.keep(card.digest, *compiled(card))
 
 
 def wrong_id(card_id: str) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pidemu.backends.choice import Engine
+from pidemu.backends.names import Engine
 from pidemu.errors import FleetError
 from pidemu.process.process import Process
 from pidemu.settings.action import Action
