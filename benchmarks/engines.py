@@ -28,7 +28,8 @@ import simple_pid
 
 import pidemu
 from benchmarks.handwritten import CBlocks, H, Numbers, library, program, run_one, stepping
-from pidemu.backends.choice import Engine, block, runner
+from pidemu.backends.choice import block, runner
+from pidemu.backends.engine_names import Engine
 from pidemu.backends.python import starting
 from pidemu.backends.runner import Run
 from pidemu.program.ir import Program

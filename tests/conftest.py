@@ -23,7 +23,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from pidemu.backends import cache
+from pidemu.files import cache
 from tests.selection import FOLDER, is_slow
 
 settings.register_profile(

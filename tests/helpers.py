@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from pidemu.algorithm.model import Algorithm
 from pidemu.arrays import Floats as Floats  # noqa: PLC0414  # the tests take it from here
 from pidemu.backends.python import compiled
-from pidemu.card.document import parse
 from pidemu.card.library import load_card
 from pidemu.card.load import Card, card_from
 from pidemu.card.model.base import Rule
 from pidemu.card.model.card_file import Setting
+from pidemu.card.reading import parse
 from pidemu.card.references import is_active
 from pidemu.errors import SettingError
 from pidemu.program.ir import Program

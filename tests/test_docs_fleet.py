@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.backends.choice import ENGINES
+from pidemu.backends.engine_names import ENGINES
 from pidemu.fleet.result import HEADER
 from tests.page_code import python_blocks, run
 from tools.regenerate.pages import ROOT, prepare, printed_by, read

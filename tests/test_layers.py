@@ -17,7 +17,7 @@ LAYERS = [re.findall(r"\b([a-z_]+)(?=/|\.py)", line) for line in _LIST.splitline
 ORDER = [room for line in LAYERS for room in line]
 FACES = {
     ("card", "settings"): {"Settings", "make_settings"},
-    ("card", "checks"): {"check"},
+    ("card", "checks"): {"remembered_check"},
     ("settings", "algorithm"): {"Algorithm", "algorithm_of"},
     ("settings", "law"): {"Law"},
 }

@@ -18,9 +18,10 @@ from click.testing import CliRunner
 from pydantic import Field, ValidationError, model_validator
 
 import pidemu
-from pidemu.card.document import Document, parse, parse_file
-from pidemu.card.model.base import Model, Number, Text
-from pidemu.card.validation import problems
+from pidemu.card.document import Document
+from pidemu.card.model.base import Number, Text
+from pidemu.card.reading import parse, parse_file
+from pidemu.card.validation import Model, problems
 from pidemu.cli import cli
 from pidemu.conversion.loopfile import read_loop
 from pidemu.errors import CardError, Problem

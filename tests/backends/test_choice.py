@@ -16,12 +16,13 @@ import pytest
 import pidemu
 from pidemu import Fleet, Process
 from pidemu.backends import native, numba
-from pidemu.backends.cache import warn
-from pidemu.backends.choice import ENGINES, Choice, Engine, block, checked, for_loops, for_record, runner
+from pidemu.backends.choice import Choice, block, checked, for_loops, for_record, runner
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.backends.python import starting
 from pidemu.backends.runner import Runner
 from pidemu.checks.runs import plausible
 from pidemu.errors import EngineError
+from pidemu.files.cache import warn
 from pidemu.process.hold import Plant
 from pidemu.program.ir import Program, Structure
 from pidemu.simulation.simulate import _scan_by_scan

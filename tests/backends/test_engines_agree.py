@@ -9,7 +9,8 @@ import pytest
 
 import pidemu
 from pidemu.backends import native
-from pidemu.backends.choice import ENGINES, Engine, block, has_numba
+from pidemu.backends.choice import block, has_numba
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.backends.python import compiled, starting
 from tests.backends.records import CARDS, SCANS, record, settings_of
 

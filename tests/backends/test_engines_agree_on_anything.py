@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 import pidemu
 from pidemu import Controller
 from pidemu.backends import native
-from pidemu.backends.choice import ENGINES, Engine, has_numba
+from pidemu.backends.choice import has_numba
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.card.library import card_files
 from pidemu.errors import PidemuError, ScanError
 from pidemu.settings.settings import Settings

@@ -9,7 +9,8 @@ import pytest
 
 import pidemu
 from pidemu.backends import native
-from pidemu.backends.choice import ENGINES, Engine, has_numba
+from pidemu.backends.choice import has_numba
+from pidemu.backends.engine_names import ENGINES, Engine
 
 SMALLEST = 5e-324
 

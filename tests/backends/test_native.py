@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 import pidemu
-from pidemu.backends import cache, native, python
+from pidemu.backends import native, python
 from pidemu.card.library import card_files
 from pidemu.errors import EngineError
+from pidemu.files import cache
 from pidemu.program.ir import Assign, Line, Name, Program, Quantity
 from tests.backends.c_compiler import needs_compiler
 from tests.helpers import Floats

@@ -16,10 +16,11 @@ import pytest
 
 import pidemu
 from pidemu import Process
-from pidemu.backends import cache, python
 from pidemu.backends import numba as target
+from pidemu.backends import python
 from pidemu.backends.python import starting
 from pidemu.checks.runs import plausible
+from pidemu.files import cache
 from pidemu.program.ir import Program
 from pidemu.simulation.measured import measured
 from pidemu.simulation.trial import trial
@@ -29,8 +30,8 @@ OTHER_PROCESS = """
 import json
 import numpy as np
 import pidemu
-from pidemu.backends import cache
 from pidemu.backends import numba
+from pidemu.files import cache
 
 s = pidemu.load_card("generic/standard").settings(K=1.5, Ti=10, Td=0)
 c = pidemu.Controller(s, 0.5, engine="numba")

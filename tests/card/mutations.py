@@ -8,8 +8,9 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from pidemu.card.document import Path_, parse
+from pidemu.card.document import Path_
 from pidemu.card.library import card_files
+from pidemu.card.reading import parse
 
 ABSURD: Final[tuple[Any, ...]] = (
     0, -1, 1, 2, 1e300, -1e300, 1e-300, 5e-324, math.inf, -math.inf, math.nan, 10**298, "9" * 5000, "", " ", "x" * 5000, "\0",

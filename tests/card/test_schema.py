@@ -11,10 +11,10 @@ import jsonschema
 import pytest
 
 import pidemu
-from pidemu.card.document import parse
 from pidemu.card.load import card_from
 from pidemu.card.model.card_file import CardFile
 from pidemu.card.model.marks import fields_of, parts_in
+from pidemu.card.reading import parse
 from pidemu.card.windup import SCHEMES, Scheme
 from pidemu.errors import CardError
 from tools.regenerate import RENEW, card_reference, card_schema

@@ -12,9 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import pidemu
-from pidemu.card.document import parse, parse_file
 from pidemu.card.library import card_files
 from pidemu.card.load import Card, card_from
+from pidemu.card.reading import parse, parse_file
 from pidemu.errors import CardError, Problem
 
 

@@ -13,7 +13,7 @@ import pytest
 import pidemu
 from pidemu import FleetResult, Loop, Process, Simulation
 from pidemu.backends import native
-from pidemu.backends.choice import ENGINES, Engine
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.card.library import card_files
 from pidemu.checks.runs import plausible
 from pidemu.errors import PidemuError

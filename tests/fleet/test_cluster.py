@@ -18,7 +18,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop
-from pidemu.backends.cache import warn
+from pidemu.files.cache import warn
 from pidemu.fleet import cluster as on_cluster
 from pidemu.fleet.cluster import run_chunk
 from pidemu.fleet.lists import PlacedLoops

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
-from pidemu.backends.cache import warn
-from pidemu.backends.choice import Engine, block
+from pidemu.backends.choice import block
+from pidemu.backends.engine_names import Engine
+from pidemu.files.cache import warn
 from pidemu.fleet import blocks, local, prepare
 from pidemu.fleet.blocks import COLUMNS
 from pidemu.fleet.group import Group, grouped
@@ -156,7 +157,7 @@ def test_a_loop_that_runs_away_says_so_and_has_the_signals_of_simulate(engine: E
         assert np.isfinite(result.columns[name][3:]).all()
 
 
-def mixed_settings(card_id: str) -> pidemu.card.load.Settings:
+def mixed_settings(card_id: str) -> pidemu.Settings:
     return next(loop.settings for loop in mixed() if loop.settings.card.id == card_id)
 
 

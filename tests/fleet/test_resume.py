@@ -16,7 +16,7 @@ import pytest
 
 import pidemu
 from pidemu import Fleet, FleetError, FleetResult, Loop, Process
-from pidemu.backends.cache import warn
+from pidemu.files.cache import warn
 from pidemu.fleet import finished, local
 from pidemu.fleet.blocks import run_block
 from pidemu.fleet.finished import keys

@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pidemu import Fleet, FleetError, FleetResult, Loop, Simulation
-from pidemu.backends.choice import Engine
+from pidemu.backends.engine_names import Engine
 from pidemu.fleet import local
 from pidemu.fleet.blocks import COLUMNS
 from pidemu.fleet.finished import FIELDS

@@ -15,7 +15,8 @@ import pidemu
 from pidemu.analysis.figures import crossover, loop_figures, scan_for
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
 from pidemu.arrays import Floats
-from pidemu.backends.choice import Choice, Engine
+from pidemu.backends.choice import Choice
+from pidemu.backends.engine_names import Engine
 from pidemu.certificate.figures import loop_rows
 from pidemu.errors import ProcessError, UndefinedError
 from pidemu.process.hold import Plant

@@ -8,11 +8,9 @@ import typing
 from enum import StrEnum
 from typing import Any, Final, Literal
 
-from pydantic.fields import FieldInfo
-
 from pidemu.card.model.base import R, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation
-from pidemu.card.model.marks import fields_of, parts_in
+from pidemu.card.model.marks import LanguageField, fields_of, parts_in
 from pidemu.card.windup import SCHEMES, Scheme
 
 BEGIN: Final = "<!-- generated from src/pidemu/card/model/card_file.py: begin -->"
@@ -34,9 +32,9 @@ def reference() -> str:
         for name, field in fields_of(model).items():
             if model is CardFile and name in fields_of(Equation):
                 continue
-            need = "required" if field.is_required() else _default(field)
-            meaning = (field.description or "").replace("|", "\\|")
-            lines.append(f"| `{field.alias or hyphenated(name)}` | {_type(field)} | {need} | {meaning} |")
+            need = "required" if field.is_required else _default(field)
+            meaning = field.meaning.replace("|", "\\|")
+            lines.append(f"| `{hyphenated(name)}` | {_type(field)} | {need} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
 
@@ -68,14 +66,14 @@ def _heading(model: type[Any]) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
 
 
-def _default(field: FieldInfo) -> str:
+def _default(field: LanguageField) -> str:
     if field.default in (None, {}, []):
         return "optional"
     shown = str(field.default).lower() if isinstance(field.default, bool) else field.default
     return f"default `{shown}`"
 
 
-def _type(field: FieldInfo) -> str:
+def _type(field: LanguageField) -> str:
     return _name(field.annotation)
 
 

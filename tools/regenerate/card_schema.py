@@ -6,15 +6,20 @@ import copy
 import json
 from typing import Any, Final
 
-from pidemu.card.model.card_file import CardFile, Equation
+from pydantic import TypeAdapter
 
+from pidemu.card.model.base import hyphenated
+from pidemu.card.model.card_file import CardFile, Equation
+from pidemu.card.model.marks import fields_of
+
+_LAST: Final = ("default", "description", "title")
 _WHOLE: Final = ("Filter", "SignalFilter", "Windup")
 """Parts that a choice replaces as a whole, by the beginning of their names."""
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a card, with unions as ``if``/``then`` so that editors follow them."""
-    plain = _plainly_named(CardFile.model_json_schema(by_alias=True))
+    plain = _plainly_named(_of(CardFile))
     definitions = plain["$defs"]
     definitions["Overlay"] = _overlay(definitions)
     definitions["Option"]["properties"]["choices"]["additionalProperties"] = {"$ref": "#/$defs/Overlay"}
@@ -22,9 +27,26 @@ def schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "pidemu card, version 1", **plain}
 
 
+def _of(part: type[CardFile] | type[Equation]) -> dict[str, Any]:
+    """Return the JSON Schema of a part as pydantic makes it, with the defaults that are made anew each time."""
+    found = TypeAdapter(part).json_schema(by_alias=True)
+    for name, field in fields_of(part).items():
+        if field.default in ({}, []):
+            found["properties"][hyphenated(name)] = dict(
+                sorted({**found["properties"][hyphenated(name)], "default": field.default}.items())
+            )
+    for definition in found["$defs"].values():
+        own = definition.get("properties", {}).get("default")  # a key of this name: what it holds, pydantic leaves unsorted
+        if own is not None:
+            definition["properties"]["default"] = dict(
+                sorted(own.items(), key=lambda item: item[0] in _LAST and _LAST.index(item[0]) + 1)
+            )
+    return found
+
+
 def _overlay(definitions: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of what a choice overlays: the equation with nothing required."""
-    full = _plainly_named(Equation.model_json_schema(by_alias=True))
+    full = _plainly_named(_of(Equation))
     definitions.update({name: d for name, d in full.get("$defs", {}).items() if name not in definitions})
     for name in list(full["$defs"]):
         if full["$defs"][name].get("type") == "object" and not name.startswith(_WHOLE):

@@ -13,19 +13,17 @@ import sys
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import numpy as np
 
 from pidemu.arrays import Floats, Integers
 from pidemu.backends import python
-from pidemu.backends.cache import warn
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.backends.runner import Block, Run, Runner
 from pidemu.errors import EngineError, suggest
+from pidemu.files.cache import warn
 from pidemu.program.ir import Program, Structure
-
-Engine = Literal["python", "numpy", "numba", "c"]
-ENGINES: Final[tuple[Engine, ...]] = get_args(Engine)
 
 _PYTHON: Final = 15e-9
 """Seconds per assignment and scan in plain Python."""

@@ -23,10 +23,10 @@ import numpy.typing as npt
 from pidemu.arrays import Floats, Integers
 from pidemu.backends.c import block_library, library
 from pidemu.backends.c_block import WIDTH
-from pidemu.backends.cache import folder, is_kept, keep, load
 from pidemu.backends.python import in_precision
 from pidemu.backends.runner import Block, Run, Runner
 from pidemu.errors import EngineError
+from pidemu.files.cache import folder, is_kept, keep, load
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 

@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from pidemu.arrays import Floats, Integers
-from pidemu.backends.cache import is_kept
 from pidemu.backends.numba_store import SUFFIX, Store, python_version
 from pidemu.backends.numba_text import WIDTH, block_text, module_text, record_text
 from pidemu.backends.runner import Block, Run, Runner
+from pidemu.files.cache import is_kept
 from pidemu.program.ir import Program, Structure
 from pidemu.program.specialise import specialise
 

@@ -1,7 +1,7 @@
 """What Numba compiled, kept from one process to the next: a file per function, signature, processor and version.
 
 Numba's own files hold pickles, and are unpickled unseen, so that a damaged one fails in any way and a foreign one runs anything.
-These go through `pidemu.backends.cache`: a file is this user's own and holds what its name says, or it is not looked into.
+These go through `pidemu.files.cache`: a file is this user's own and holds what its name says, or it is not looked into.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 from typing import Any, Final
 
 from pidemu import __version__
-from pidemu.backends.cache import keep, load
+from pidemu.files.cache import keep, load
 
 SUFFIX: Final = ".numba"
 

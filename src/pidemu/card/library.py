@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
-from pidemu.card.load import Card, load_file, wrong_id
+from pidemu.card import store
+from pidemu.card.document import CARD, digest_of
+from pidemu.card.load import Card, keep, load_file, status_counts, wrong_id
 from pidemu.errors import CardError, CardNotFoundError, Problem, suggest
 from pidemu.excerpt import shortened, visible
+from pidemu.files.reading import read_text
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
@@ -192,12 +196,52 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
         card = load_file(file, card_id)
     except CardError as error:
         return error
-    if file.resolve().is_relative_to(builtin_folder().resolve()):
+    if _is_builtin(file):
+        keep(card)
         return card
-    from pidemu.checks import check  # the rules run a card, and everything that runs one depends on cards
+    from pidemu.checks import remembered_check  # the rules run a card, and everything that runs one depends on cards
 
-    problems = check(card)
+    problems = remembered_check(card)
     return CardError(problems) if problems else card
+
+
+def _is_builtin(file: Path) -> bool:
+    return file.resolve().is_relative_to(builtin_folder().resolve())
+
+
+@dataclass(frozen=True, slots=True)
+class CardEntry:
+    """What a list of cards says of one.
+
+    Attributes
+    ----------
+    id, title : str
+        The card's.
+    status : dict
+        How many fields of its default variant have each status.
+    """
+
+    id: str
+    title: str
+    status: Mapping[str, int]
+
+
+def card_entry(file: Path, card_id: str) -> CardEntry:
+    """Return what a list of cards says of a card; a compiled one is not loaded for it.
+
+    Raises
+    ------
+    CardError
+        See `load_file`.
+    """
+    digest = digest_of(read_text(file, CardError, CARD))
+    short = store.summary(digest)
+    if short is None:
+        card = load_file(file, card_id)
+        if _is_builtin(file):
+            keep(card)
+        return CardEntry(card_id, card.title, status_counts(card))
+    return CardEntry(card_id, short["title"], short["status"])
 
 
 def _is_file(path: Path) -> bool:

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pydantic import ValidationError
-
-from pidemu.card.document import Document, Path_, parse_file
-from pidemu.card.model.base import Evidence, Status
+from pidemu.card import store
+from pidemu.card.document import CARD, Document, Path_, digest_of
+from pidemu.card.model.base import Evidence, Status, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation, Setting
 from pidemu.card.references import is_active, makes_the_law, named_settings
-from pidemu.card.validation import problems
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
-from pidemu.excerpt import is_hidden
+from pidemu.excerpt import is_hidden, visible
+from pidemu.files.reading import read_text
 
 if TYPE_CHECKING:
     from pidemu.settings.settings import Settings
@@ -31,7 +32,7 @@ MOST_COMBINATIONS: Final = 200
 """Combinations of options, all of which are checked."""
 _LONGEST_ID: Final = 200
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
-EQUATION_KEYS = tuple(f.alias or name for name, f in Equation.model_fields.items())
+EQUATION_KEYS = tuple(hyphenated(f.name) for f in fields(Equation))
 
 
 def overlay(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -231,11 +232,14 @@ class Card:
         What the card says.
     document : Document
         The file, with places.
+    compiled : Compiled or None
+        Its plain data, where it was not read from its file.
     """
 
     id: str
     data: CardFile
     document: Document = field(repr=False)
+    compiled: store.Compiled | None = field(default=None, repr=False, compare=False)
     _variants: dict[tuple[str, ...], Variant] = field(default_factory=dict, repr=False, compare=False)
 
     def __hash__(self) -> int:
@@ -314,6 +318,8 @@ class Card:
         raw = {k: raw[k] for k in EQUATION_KEYS if k in raw}
         if isinstance(raw.get("settings"), dict):  # dials that choices add stand in their usual place, not at the end
             raw["settings"] = dict(sorted(raw["settings"].items(), key=_usual_place))
+        if self.compiled is not None:
+            return Variant(self, chosen, self.compiled.equation(tuple(chosen.values())), raw)
         variant = Variant(self, chosen, _equation(raw, self.document, chosen), raw)
         _refuse_wrong_references(variant)
         return variant
@@ -375,10 +381,9 @@ def _equation(raw: dict[str, Any], document: Document, chosen: Mapping[str, str]
         best = max(range(len(homes)), key=lambda i: (held[i], i if held[i] else -i))
         return (*homes[best], *path)
 
-    try:
-        return Equation.model_validate(raw)
-    except ValidationError as error:
-        raise CardError(capped(problems(error, raw, Equation, document, locate))) from None
+    from pidemu.card.validation import validated
+
+    return validated(Equation, raw, document, locate)
 
 
 def _refuse_wrong_references(variant: Variant) -> None:
@@ -413,10 +418,9 @@ def card_from(document: Document, card_id: str) -> Card:
     """
     if "card" not in document.value:  # what another file holds is not told
         raise CardError([document.problem((), "missing key 'card'")])
-    try:
-        data = CardFile.model_validate(document.value)
-    except ValidationError as error:
-        raise CardError(capped(problems(error, document.value, CardFile, document, lambda p: p))) from None
+    from pidemu.card.validation import validated
+
+    data = validated(CardFile, document.value, document)
     card = Card(card_id, data, document)
     found: list[Problem] = []
     for name, option in data.options.items():
@@ -430,9 +434,9 @@ def card_from(document: Document, card_id: str) -> Card:
         )
         raise CardError([document.problem(("options",), message, at_key=True)])
     for name, option in data.options.items():
-        for choice, fields in option.choices.items():
+        for choice, changed in option.choices.items():
             where = ("options", name, "choices", choice)
-            unknown = [key for key in fields if key not in EQUATION_KEYS]
+            unknown = [key for key in changed if key not in EQUATION_KEYS]
             found += [
                 document.problem((*where, key), f"unknown key '{key}'{suggest(key, EQUATION_KEYS)}", at_key=True) for key in unknown
             ]
@@ -461,14 +465,48 @@ def load_file(file: Path, card_id: str | None = None, shown: str | None = None) 
     Raises
     ------
     CardError
-        See `card_from` and `parse_file`; or its name cannot be an id.
+        See `card_from` and `pidemu.card.reading.parse`; or its name cannot be an id.
     """
     path = Path(os.path.realpath(file))  # which also says something of links that go round
     card_id = card_id or f"{path.parent.name}/{path.stem}"
     wrong = wrong_id(card_id)
     if wrong is not None:
         raise CardError([Problem(shown or str(file), 1, 1, wrong)])
-    return card_from(parse_file(file, shown), card_id)
+    name = visible(shown or str(file))
+    text = read_text(path, CardError, CARD, shown=name)
+    compiled = store.find(digest_of(text))
+    if compiled is not None:
+        document = Document(name, (), compiled.value, digest=digest_of(text), unread=path)
+        return Card(card_id, compiled.data, document, compiled)
+    from pidemu.card.reading import parse
+
+    return card_from(parse(text, name), card_id)
+
+
+def status_counts(card: Card) -> dict[str, int]:
+    """Return how many fields of the default variant have each status."""
+    found = Counter(s.evidence.status for s in card.variant().statements if s.evidence)
+    return {s.value: found[s] for s in Status}
+
+
+def compiled(card: Card) -> tuple[store.Compiled, dict[str, Any]]:
+    """Return a card as plain data, and what it says of itself in short.
+
+    Raises
+    ------
+    CardError
+        Two choices, each fine by itself, do not go together.
+    """
+    equations = {tuple(variant.chosen.values()): variant.equation for variant in variants(card)}
+    short = {"title": card.title, "status": status_counts(card)}
+    return store.Compiled.of(card.document.value, card.data, equations), short
+
+
+def keep(card: Card) -> None:
+    """Keep a card compiled, for the next time that it is loaded; it must be known to be right."""
+    if card.compiled is None:
+        with contextlib.suppress(CardError):
+            store.keep(card.digest, *compiled(card))
 
 
 def wrong_id(card_id: str) -> str | None:

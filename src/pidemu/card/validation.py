@@ -1,18 +1,22 @@
-"""What the model says of a wrong card, in words and with its place."""
+"""Cards held against the card language by pydantic, and what it says of a wrong one, in words and with its place.
+
+What imports this module imports pydantic. It is needed only where a card is read that was not compiled before.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import Any, Final, get_args, get_origin
+from typing import Any, Final, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from pidemu.card.document import Document, Path_
-from pidemu.card.model.base import hyphenated
+from pidemu.card.model.base import CONFIG, hyphenated
+from pidemu.card.model.card_file import CardFile, Equation
 from pidemu.card.model.marks import fields_of, parts_in
-from pidemu.errors import Problem, suggest
+from pidemu.errors import CardError, Problem, capped, suggest
 from pidemu.excerpt import shortened
 
 _LONGEST: Final = 60
@@ -21,6 +25,14 @@ _OF_NUMBERS: Final = ("not_a_number", "implausible")
 _UNKNOWN: Final = ("extra_forbidden", "unexpected_keyword_argument")
 Locate = Callable[[Path_], Path_]
 """From a path in the value that was validated to the path in the file."""
+_LANGUAGE: Final[dict[type[Any], TypeAdapter[Any]]] = {part: TypeAdapter(part) for part in (CardFile, Equation)}
+Whole = TypeVar("Whole", CardFile, Equation)
+
+
+class Model(BaseModel):
+    """Base of files that are written like cards: frozen, and nothing but the documented keys."""
+
+    model_config = ConfigDict(**CONFIG)  # type: ignore[typeddict-item]
 
 
 def _walk(value: Any, loc: tuple[str | int, ...]) -> tuple[Path_, Any]:
@@ -34,7 +46,7 @@ def _walk(value: Any, loc: tuple[str | int, ...]) -> tuple[Path_, Any]:
     return tuple(path), value
 
 
-def _fields(model: type[BaseModel], path: Path_) -> list[str]:
+def _fields(model: type[Any], path: Path_) -> list[str]:
     """Return the keys that may stand in the mapping at `path`, for a suggestion."""
     keys: set[str] = set()
     _collect(model, list(path), keys)
@@ -43,20 +55,26 @@ def _fields(model: type[BaseModel], path: Path_) -> list[str]:
 
 def _collect(annotation: Any, path: list[str | int], keys: set[str]) -> None:
     part = get_origin(annotation) or annotation
-    if isinstance(part, type) and parts_in(part):
-        for name, field in fields_of(part).items():
-            key = field.alias or hyphenated(name)
+    if isinstance(part, type) and (parts_in(part) or issubclass(part, BaseModel)):
+        for key, inner in _keys(part):
             if not path:
                 keys.add(key)
             elif key == path[0]:
-                _collect(field.annotation, path[1:], keys)
+                _collect(inner, path[1:], keys)
         return
     container = part in (dict, list, tuple)
     for argument in get_args(annotation):
         _collect(argument, path[1:] if container and path else path, keys)
 
 
-def _message(error: ErrorDetails, path: Path_, value: Any, model: type[BaseModel], scheme: object) -> str:
+def _keys(part: type[Any]) -> list[tuple[str, Any]]:
+    """Return the keys of a part and their types."""
+    if issubclass(part, BaseModel):
+        return [(field.alias or hyphenated(name), field.annotation) for name, field in part.model_fields.items()]
+    return [(hyphenated(name), field.annotation) for name, field in fields_of(part).items()]
+
+
+def _message(error: ErrorDetails, path: Path_, value: Any, model: type[Any], scheme: object) -> str:
     kind, context = error["type"], error.get("ctx", {})
     shown = _shown(value)
     if kind in _UNKNOWN:
@@ -138,7 +156,31 @@ def _shown(value: Any) -> str:
     return f"'{shortened(value, _LONGEST)}'" if isinstance(value, str) else shortened(repr(value), _LONGEST)
 
 
-def problems(error: ValidationError, value: Any, model: type[BaseModel], document: Document, locate: Locate) -> Iterable[Problem]:
+def validated(part: type[Whole], value: Any, document: Document, locate: Locate = lambda path: path) -> Whole:
+    """Return a card, or an equation, made of plain values.
+
+    Parameters
+    ----------
+    part : type
+        `CardFile` or `Equation`.
+    value : object
+        The plain values.
+    document, locate
+        See `problems`.
+
+    Raises
+    ------
+    CardError
+        They do not obey the language: every problem, located.
+    """
+    try:
+        found: Whole = _LANGUAGE[part].validate_python(value)
+    except ValidationError as error:
+        raise CardError(capped(problems(error, value, part, document, locate))) from None
+    return found
+
+
+def problems(error: ValidationError, value: Any, model: type[Any], document: Document, locate: Locate) -> Iterable[Problem]:
     """Yield one located problem per faulty place.
 
     Parameters
@@ -147,8 +189,8 @@ def problems(error: ValidationError, value: Any, model: type[BaseModel], documen
         What pydantic found in `value`.
     value : dict
         The plain value that was validated against `model`.
-    model : type of BaseModel
-        The model.
+    model : type
+        The part of the language, or a `Model`.
     document : Document
         The file.
     locate : callable

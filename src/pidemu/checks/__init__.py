@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pidemu.card.load import Card, load_file, variants
-from pidemu.checks import equations, runs, statements
+from pidemu.card import store
+from pidemu.card.load import Card, keep, load_file, variants
 from pidemu.errors import CardError, Problem, capped
 
 
@@ -17,6 +17,8 @@ def check(card: Card) -> list[Problem]:
     card : Card
         The card.
     """
+    from pidemu.checks import equations, runs, statements  # NumPy and all that runs a card
+
     try:
         found = {p for rule in statements.RULES for p in rule(card)}
         found |= {p for variant in variants(card) for rule in equations.RULES for p in rule(variant)}
@@ -25,6 +27,23 @@ def check(card: Card) -> list[Problem]:
     except CardError as error:  # two choices, each fine by itself, do not go together
         found = set(error.problems)
     return capped(found)
+
+
+def remembered_check(card: Card) -> list[Problem]:
+    """Return every breach of the rules; a card that had none is not checked again as long as neither it nor pidemu has changed.
+
+    Parameters
+    ----------
+    card : Card
+        The card.
+    """
+    if store.is_checked(card.digest, card.id):
+        return []
+    found = check(card)
+    if not found:
+        store.keep_checked(card.digest, card.id)
+        keep(card)
+    return found
 
 
 def check_file(file: Path, card_id: str | None = None, shown: str | None = None) -> list[Problem]:
@@ -40,6 +59,6 @@ def check_file(file: Path, card_id: str | None = None, shown: str | None = None)
         Its name in messages.
     """
     try:
-        return check(load_file(file, card_id, shown))
+        return remembered_check(load_file(file, card_id, shown))
     except CardError as error:
         return list(error.problems)

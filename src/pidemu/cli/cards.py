@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import click
 
-from pidemu.card.library import card_files, unusable_files
-from pidemu.card.load import Card, load_file
+from pidemu.card.library import CardEntry, card_entry, card_files, unusable_files
 from pidemu.card.model.base import Status
 from pidemu.cli.common import echo, json_option, print_json, table, vendors_option
 from pidemu.errors import CardError
@@ -22,11 +19,11 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
 
     Beside each: how many of its statements are documented, measured, inferred or assumed.
     """
-    rows: list[Card] = []
+    rows: list[CardEntry] = []
     broken = [problem.headline() for problem in unusable_files(vendors)]
     for card_id, file in card_files(vendors).items():
         try:
-            card = load_file(file, card_id)
+            card = card_entry(file, card_id)
         except CardError as error:
             broken.append(f"{card_id}: {error.problems[0].headline()}")
             continue
@@ -35,11 +32,11 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
     if not rows and not broken:
         raise click.UsageError(f"no card holds '{word}'; 'pidemu cards' lists all")
     if as_json:
-        print_json([{"card": c.id, "title": c.title, "status": _counts(c)} for c in rows])
+        print_json([{"card": c.id, "title": c.title, "status": dict(c.status)} for c in rows])
     else:
         table(
             ["card", "controller", *(s.value for s in Status)],
-            [[c.id, c.title, *(str(n) for n in _counts(c).values())] for c in rows],
+            [[c.id, c.title, *(str(n) for n in c.status.values())] for c in rows],
             indent=0,
             right=(2, 3, 4, 5),
         )
@@ -47,9 +44,3 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
         echo(f"error: {message}", err=True)
     if broken:
         raise SystemExit(1)
-
-
-def _counts(card: Card) -> dict[str, int]:
-    """Return how many fields of the default variant have each status."""
-    found = Counter(s.evidence.status for s in card.variant().statements if s.evidence)
-    return {s.value: found[s] for s in Status}

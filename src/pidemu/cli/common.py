@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from pidemu.backends.choice import ENGINES, Engine
+from pidemu.backends.engine_names import ENGINES, Engine
 from pidemu.card.load import Card
 from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.errors import SettingError

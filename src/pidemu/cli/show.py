@@ -6,7 +6,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -15,7 +15,7 @@ from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
 from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.library import load_card
 from pidemu.card.load import EMULATION, Card, Variant
-from pidemu.card.model.base import Evidence
+from pidemu.card.model.base import Evidence, as_written
 from pidemu.card.model.card_file import Example, Setting
 from pidemu.cli.common import (
     RangeArgument,
@@ -33,12 +33,12 @@ from pidemu.cli.common import (
 from pidemu.cli.common import given as given_ranges
 from pidemu.errors import SettingError, suggest
 from pidemu.excerpt import visible
-from pidemu.explanation.explain import explain
-from pidemu.explanation.model import Explanation
-from pidemu.explanation.text import sections, table_lines
 from pidemu.formatting import json_safe
 from pidemu.settings.ranges import RANGES, SignalRange
 from pidemu.settings.settings import off_values
+
+if TYPE_CHECKING:
+    from pidemu.explanation.model import Explanation
 
 _WIDTH: Final = 110
 _LEAST: Final = 36
@@ -75,6 +75,8 @@ def command(
     options, dials = split_options(found, given)
     _refuse_unknown(found, dials)
     if dials or scan is not None:
+        from pidemu.explanation.explain import explain  # with NumPy, which a data sheet does without
+
         explained = explain(found.settings(given), scan)
         if as_json:
             print_json(explained.to_dict())
@@ -113,6 +115,8 @@ def _refuse_unknown(card: Card, dials: Mapping[str, object]) -> None:
 
 def _explained(e: Explanation) -> None:
     """Print an explanation, its headings in bold on a terminal."""
+    from pidemu.explanation.text import sections, table_lines
+
     title, *_ = e.text.split("\n\n", 1)
     heading(title)
     for name, rows in sections(e):
@@ -231,6 +235,6 @@ def _plain(variant: Variant) -> dict[str, object]:
         "options": dict(variant.chosen),
         "equation": equation_lines(variant),
         "behaviour": dict([*scan_rows(q), *limit_rows(q), *mode_rows(q)]),
-        "content": json_safe(card.data.model_dump(mode="python", by_alias=True, exclude_none=True)),
+        "content": json_safe(as_written(card.data)),
         "assumed": [a.path for a in variant.assumptions()],
     }

@@ -11,7 +11,8 @@ from typing import Any, Final
 import click
 
 from pidemu.analysis.loop_figures import LoopFigures
-from pidemu.backends.choice import Choice, Engine, checked
+from pidemu.backends.choice import Choice, checked
+from pidemu.backends.engine_names import Engine
 from pidemu.card.library import load_card
 from pidemu.certificate.figures import other_units, unit_of
 from pidemu.cli.common import (

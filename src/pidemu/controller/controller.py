@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from pidemu.algorithm.model import Algorithm
 from pidemu.arrays import Floats
-from pidemu.backends.choice import Choice, Engine, checked, for_record
+from pidemu.backends.choice import Choice, checked, for_record
+from pidemu.backends.engine_names import Engine
 from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
 from pidemu.columns.functions import isfinite

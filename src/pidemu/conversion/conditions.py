@@ -166,7 +166,7 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
         other = Form.SERIES if s.equation.form is Form.STANDARD else Form.STANDARD
         if s.equation.form is Form.PARALLEL:
             return ""
-        found = _result(c, s, f"if it is {_FORMS[other]}", lambda e: e.model_copy(update={"form": other}), is_source=is_source)
+        found = _result(c, s, f"if it is {_FORMS[other]}", lambda e: replace(e, form=other), is_source=is_source)
         return "; ".join(filter(None, (found, _bump_test(s, other) if is_source else "")))
     if statement.path == "derivative.filter.ratio":
         texts = [
@@ -187,7 +187,7 @@ def _spread(c: Conversion, s: Settings, statement: Statement, *, is_source: bool
 
 def _bump_test(s: Settings, other: Form) -> str:
     """Return the test on the old controller that tells two forms apart: what a PV step leaves beside the integral."""
-    varied = replace(s, variant=replace(s.variant, equation=s.equation.model_copy(update={"form": other})))
+    varied = replace(s, variant=replace(s.variant, equation=replace(s.equation, form=other)))
     jumps = [number(abs(x.law().moments()[1]), 4) for x in (s, varied)]
     return (
         f"a bump test tells: once the derivative has died out, a PV step of 1 % has moved the old output by {jumps[0]} % "
@@ -201,7 +201,7 @@ _FORMS: Final = {Form.SERIES: "interacting (series)", Form.STANDARD: "noninterac
 def _with_filter(e: Equation, ratio: float) -> Equation:
     filt = e.derivative.filter
     new: Filter[Reference] = Filter(applies_to="term", ratio=ratio) if filt is None else replace(filt, ratio=ratio)
-    return e.model_copy(update={"derivative": replace(e.derivative, filter=new)})
+    return replace(e, derivative=replace(e.derivative, filter=new))
 
 
 def _result(c: Conversion, s: Settings, when: str, change: Callable[[Equation], Equation], *, is_source: bool) -> str:

@@ -10,10 +10,10 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationError
 
-from pidemu.card.document import parse_file
 from pidemu.card.library import not_an_id
-from pidemu.card.model.base import Model, Number, Text
-from pidemu.card.validation import problems
+from pidemu.card.model.base import Number, Text
+from pidemu.card.reading import parse_file
+from pidemu.card.validation import Model, problems
 from pidemu.errors import CardError, CardNotFoundError
 from pidemu.excerpt import visible
 from pidemu.files.reading import Kind, is_folder

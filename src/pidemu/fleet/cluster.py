@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
+from pidemu.files.cache import warn
 from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.lists import PlacedLoops
 from pidemu.fleet.local import outcomes

@@ -135,7 +135,7 @@ def _key(loop: Loop, plan: FleetPlan, equations: dict[int, str]) -> str:
     settings, process = loop.settings, loop.process
     variant = settings.variant
     if id(variant) not in equations:
-        equations[id(variant)] = f"{variant.card.id} {sorted(variant.chosen.items())} {variant.equation.model_dump_json()}"
+        equations[id(variant)] = f"{variant.card.id} {sorted(variant.chosen.items())} {variant.equation!r}"
     said = {name: getattr(plan, name) if (own := getattr(loop, name)) is None else own for name in ("setpoint", "load", "time")}
     what = (
         __version__,

@@ -7,7 +7,8 @@ from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
-from pidemu.backends.choice import Engine, checked
+from pidemu.backends.choice import checked
+from pidemu.backends.engine_names import Engine
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import keys

@@ -8,7 +8,8 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from pidemu.backends.choice import Choice, Engine, block, for_loops, give_up, instead, one_by_one
+from pidemu.backends.choice import Choice, block, for_loops, give_up, instead, one_by_one
+from pidemu.backends.engine_names import Engine
 from pidemu.backends.runner import Block
 from pidemu.errors import FleetError
 from pidemu.fleet.blocks import BlockOutcome, Room, Stopped, run_block

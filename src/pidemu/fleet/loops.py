@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pidemu.backends.choice import Engine
+from pidemu.backends.engine_names import Engine
 from pidemu.process.process import Process
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings

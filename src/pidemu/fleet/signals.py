@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.backends.cache import warn
 from pidemu.errors import FleetError
+from pidemu.files.cache import warn
 from pidemu.files.outputs import refuse_overlap
 from pidemu.fleet.blocks import BlockOutcome
 from pidemu.fleet.finished import Finished, finished

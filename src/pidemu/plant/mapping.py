@@ -10,11 +10,12 @@ from typing import Any, Final, Literal, TypeVar
 
 from pydantic import Field, ValidationError
 
-from pidemu.card.document import Document, parse_file
+from pidemu.card.document import Document
 from pidemu.card.library import cards, load_card, not_an_id
 from pidemu.card.load import Card
-from pidemu.card.model.base import Model, Text
-from pidemu.card.validation import problems
+from pidemu.card.model.base import Text
+from pidemu.card.reading import parse_file
+from pidemu.card.validation import Model, problems
 from pidemu.errors import CardError, ListError, PidemuError, suggest
 from pidemu.files.reading import Kind
 from pidemu.plant.fields import folded

@@ -13,7 +13,8 @@ from pydantic import Field
 
 from pidemu.card.library import load_card
 from pidemu.card.load import Card
-from pidemu.card.model.base import Model, Number, Text
+from pidemu.card.model.base import Number, Text
+from pidemu.card.validation import Model
 from pidemu.conversion.match_method import read_aim
 from pidemu.errors import ListError, PidemuError, SettingError, suggest
 from pidemu.files.reading import Kind

@@ -11,7 +11,8 @@ from pidemu.analysis.figures import loop_figures
 from pidemu.analysis.load_response import continuous_load_iae, load_iae
 from pidemu.analysis.loop_figures import LoopComparison, LoopFigures
 from pidemu.arrays import Floats
-from pidemu.backends.choice import Choice, Engine, checked, for_record, safe_runner
+from pidemu.backends.choice import Choice, checked, for_record, safe_runner
+from pidemu.backends.engine_names import Engine
 from pidemu.backends.python import starting
 from pidemu.controller.controller import Controller
 from pidemu.process.hold import Plant

@@ -1,15 +1,16 @@
-"""What every part of a card is made of: the base model, kinds of values, rules, evidence."""
+"""What every part of a card is made of: the base of the parts, kinds of values, rules, evidence."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from datetime import date
 from enum import StrEnum
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, cast
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pidemu.card.model.declared import Means, Only, refusal
 
 SMALLEST: Final = 1e-40
 LARGEST: Final = 1e40
@@ -27,91 +28,93 @@ def _infinity(value: Any) -> Any:
 
 def _plausible(value: float) -> float:
     if math.isnan(value):
-        raise PydanticCustomError("not_a_number", "nan is not a number; give one")
+        raise refusal("not_a_number", "nan is not a number; give one")
     if value and math.isfinite(value) and not SMALLEST <= abs(value) <= LARGEST:
-        raise PydanticCustomError("implausible", "{value} is not a plausible number", {"value": f"{value:g}"})
+        raise refusal("implausible", f"{value:g} is not a plausible number")
     return value
 
 
 def _day(value: Any) -> Any:
     if not (isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value)):  # 2026 and 0 are no days
-        raise PydanticCustomError("date_type", "not a date")
+        raise refusal("date_type", "not a date")
     return value
 
 
 def _line(value: str) -> str:
     if "\n" in value or "\t" in value:
-        raise PydanticCustomError("one_line", "more than one line; a name is one line, without tabs")
+        raise refusal("one_line", "more than one line; a name is one line, without tabs")
     return value
 
 
-_CONFIG: Final = ConfigDict(
-    extra="forbid",
-    frozen=True,
-    alias_generator=hyphenated,
-    populate_by_name=False,
-    str_strip_whitespace=True,
-    defer_build=True,  # parts are built within the whole; by themselves only where they are used
-)
-
-
-class Model(BaseModel):
-    """Base of what only a card has: frozen, and nothing but the documented keys."""
-
-    model_config = _CONFIG
+CONFIG: Final = {
+    "extra": "forbid",
+    "frozen": True,
+    "alias_generator": hyphenated,
+    "populate_by_name": False,
+    "str_strip_whitespace": True,
+    "defer_build": True,  # parts are built within the whole; by themselves only where they are used
+}
+"""How pydantic takes what a card says: nothing but the documented keys, blanks around texts cut off."""
 
 
 class Part:
-    """Base of what a card and the algorithm that is made of it have alike: frozen dataclasses, and nothing but the documented keys.
+    """Base of all that a card is made of: frozen dataclasses, which `pidemu.card.validation` has checked by pydantic.
 
-    Where a card has a number or the name of a setting, the algorithm has the number: such a part is generic over `R`, and is
-    ``Setpoint[Reference]`` in a card, ``Setpoint[float]`` in an algorithm.
+    An algorithm has many of them in common with the card. Where a card has a number or the name of a setting, the algorithm has the
+    number: such a part is generic over `R`, and is ``Setpoint[Reference]`` in a card, ``Setpoint[float]`` in an algorithm.
     """
 
     __slots__ = ()
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[Mapping[str, Any]] = CONFIG
+
+
+def as_written(value: Any) -> Any:
+    """Return a part, or what holds parts, as a card writes it: plain values by the keys of the language, nothing that is absent."""
+    if isinstance(value, Part):
+        there = {f.name: getattr(value, f.name) for f in fields(cast(Any, value))}
+        return {hyphenated(name): as_written(inner) for name, inner in there.items() if inner is not None}
+    if isinstance(value, dict):
+        return {key: as_written(inner) for key, inner in value.items()}
+    return [as_written(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 R = TypeVar("R")
 """What stands for a number: in a card a `Reference`, in an algorithm a number."""
 
 
-def means(text: str) -> Any:
+def means(text: str) -> Means:
     """Return what describes a field of a part: the reference of the language is made of it."""
-    return Field(description=text)
+    return Means(text)
 
 
-Text = Annotated[str, Field(min_length=1, max_length=10_000)]
-"""Sentences, in one line or several; `pidemu.card.document` lets nothing in that cannot be seen."""
+Text = Annotated[str, Only(min_length=1, max_length=10_000)]
+"""Sentences, in one line or several; `pidemu.card.reading` lets nothing in that cannot be seen."""
 
 
-Name = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_line)]
+Name = Annotated[str, Only(min_length=1, max_length=200, after=_line)]
 """What a thing is called, or where it stands: one line."""
 
 
 Number = Annotated[
     float,
-    Field(strict=True),
-    BeforeValidator(_infinity),
-    AfterValidator(_plausible),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
+    Only(strict=True, before=_infinity, after=_plausible, schema={"anyOf": [{"type": "number"}, {"enum": ["inf", "-inf"]}]}),
 ]
 
 
-Size = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False), AfterValidator(_plausible)]
+Size = Annotated[float, Only(gt=0, strict=True, allow_inf_nan=False, after=_plausible)]
 """A number above zero."""
 
 
-Count = Annotated[int, Field(gt=0, le=10**9, strict=True)]
+Count = Annotated[int, Only(gt=0, le=10**9, strict=True)]
 
 
-Day = Annotated[date, BeforeValidator(_day)]
+Day = Annotated[date, Only(before=_day)]
 
 
-Flag = Annotated[bool, Field(strict=True)]
+Flag = Annotated[bool, Only(strict=True)]
 
 
-SettingName = Annotated[str, Field(max_length=64, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+SettingName = Annotated[str, Only(max_length=64, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Form(StrEnum):
@@ -150,35 +153,39 @@ class Status(StrEnum):
     ASSUMED = "assumed"
 
 
-class Source(Model):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source(Part):
     """A document or program that the card rests on."""
 
-    title: Text = Field(description="Title of the document, with number and edition; or name and version of the program.")
-    address: Text | None = Field(default=None, description="Where it can be read: address, document number or repository path.")
-    read: Day = Field(description="The day it was read.")
-    product: Text | None = Field(
-        default=None,
-        description="The product that it is about, where that is another one than the card's. Such a source cannot document or "
-        "measure anything of this card; what follows from it is `inferred`.",
-    )
-    note: Text | None = Field(
-        default=None, description="What kind of witness it is, where that matters (a forum post, third-party code)."
-    )
+    title: Annotated[Text, means("Title of the document, with number and edition; or name and version of the program.")]
+    address: Annotated[Text | None, means("Where it can be read: address, document number or repository path.")] = None
+    read: Annotated[Day, means("The day it was read.")]
+    product: Annotated[
+        Text | None,
+        means(
+            "The product that it is about, where that is another one than the card's. Such a source cannot document or "
+            "measure anything of this card; what follows from it is `inferred`."
+        ),
+    ] = None
+    note: Annotated[Text | None, means("What kind of witness it is, where that matters (a forum post, third-party code).")] = None
 
 
-class Evidence(Model):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence(Part):
     """Where a statement of the card comes from, and how sure it is."""
 
-    status: Status = Field(
-        description="`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
-        "from something documented) or `assumed` (no source says so; shown wherever a result rests on it)."
+    status: Annotated[
+        Status,
+        means(
+            "`documented` (the source says so), `measured` (an output of the real thing shows it), `inferred` (it follows "
+            "from something documented) or `assumed` (no source says so; shown wherever a result rests on it)."
+        ),
+    ]
+    source: Annotated[Name | None, means("Key of an entry under `sources`. Required unless `assumed`.")] = None
+    at: Annotated[Text | None, means("Place in the source: page, section, function. Required for `documented` and `measured`.")] = (
+        None
     )
-    source: Name | None = Field(default=None, description="Key of an entry under `sources`. Required unless `assumed`.")
-    at: Text | None = Field(
-        default=None,
-        description="Place in the source: page, section, function. Required for `documented` and `measured`.",
-    )
-    note: Text | None = Field(default=None, description="Why: required for `inferred` and `assumed`.")
+    note: Annotated[Text | None, means("Why: required for `inferred` and `assumed`.")] = None
 
 
 Reference = SettingName | Number

@@ -10,10 +10,9 @@ import dataclasses
 import typing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
+from pidemu.card.model.declared import Means
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,35 +65,61 @@ class PerScan:
     """The field says how the law is computed scan by scan, or what happens at limits and transfers: the law is the same without."""
 
 
+@dataclass(frozen=True, slots=True)
+class LanguageField:
+    """A field of the card language, or of an algorithm.
+
+    Attributes
+    ----------
+    annotation : object
+        Its type.
+    metadata : tuple
+        What it is marked with.
+    default : object
+        What it is where the card says nothing; `dataclasses.MISSING` where the card has to say it.
+    """
+
+    annotation: Any
+    metadata: tuple[Any, ...]
+    default: Any
+
+    @property
+    def is_required(self) -> bool:
+        """Whether a card has to say it."""
+        return self.default is dataclasses.MISSING
+
+    @property
+    def meaning(self) -> str:
+        """What it means, in sentences."""
+        return next((mark.text for mark in self.metadata if isinstance(mark, Means)), "")
+
+
 Mark = TypeVar("Mark", bound=Names | Beyond | AtRest | PerScan)
 Tree = TypeVar("Tree")
-_fields: dict[type[Any], dict[str, FieldInfo]] = {}
+_fields: dict[type[Any], dict[str, LanguageField]] = {}
 _marks: dict[tuple[type[Any], type[Any]], dict[str, Any]] = {}
 _ways: dict[tuple[type[Any], type[Any]], tuple[tuple[str, Any, bool], ...]] = {}
 
 
-def fields_of(part: type[Any]) -> dict[str, FieldInfo]:
+def fields_of(part: type[Any]) -> dict[str, LanguageField]:
     """Return the fields of a part of the card language by their names in Python, in order."""
     if part not in _fields:
-        if issubclass(part, BaseModel):
-            _fields[part] = dict(part.model_fields)
-        else:
-            hints = typing.get_type_hints(part, include_extras=True)
-            _fields[part] = {f.name: _field(hints[f.name], f) for f in dataclasses.fields(part)}
+        hints = typing.get_type_hints(part, include_extras=True)
+        _fields[part] = {f.name: _field(hints[f.name], f) for f in dataclasses.fields(part)}
     return _fields[part]
 
 
-def _field(annotation: Any, field: dataclasses.Field[Any]) -> FieldInfo:
-    found = FieldInfo.from_annotation(annotation)
-    if field.default is not dataclasses.MISSING:
-        found.default = field.default
-    return found
+def _field(annotation: Any, field: dataclasses.Field[Any]) -> LanguageField:
+    default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+    if typing.get_origin(annotation) is not Annotated:
+        return LanguageField(annotation, (), default)
+    return LanguageField(annotation.__origin__, annotation.__metadata__, default)
 
 
 def parts_in(annotation: Any) -> list[type[Any]]:
     """Return the parts of the card language that a type names, as in ``SignalFilter[R] | None``."""
     named = typing.get_origin(annotation) or annotation
-    if isinstance(named, type) and (dataclasses.is_dataclass(named) or issubclass(named, BaseModel)):
+    if isinstance(named, type) and dataclasses.is_dataclass(named):
         return [named]
     return [part for argument in typing.get_args(annotation) for part in parts_in(argument)]
 

@@ -5,27 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Generic, Literal
 
-from pydantic import AfterValidator, Field
-from pydantic_core import PydanticCustomError
-
-from pidemu.card.model.base import Count, Flag, Model, Name, Number, Part, R, means
+from pidemu.card.model.base import Count, Flag, Name, Number, Part, R, means
+from pidemu.card.model.declared import Only, refusal
 from pidemu.card.model.marks import Beyond, Names
 
 
-class Faults(Model):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Faults(Part):
     """What happens with signals that are not numbers and with scan intervals that are none."""
 
-    signal: Literal["hold", "propagate", "nan", "zero"] = Field(
-        default="hold",
-        description="Setpoint or measurement is NaN or infinite: `hold` the output, nothing is computed and the state stands "
-        "still; `propagate`: it is computed with; `nan`, `zero`: that is the output for this scan, and the state stands still.",
-    )
-    zero_interval: Literal["hold", "compute"] = Field(
-        default="hold", description="An interval of zero: nothing is done and the last output stands, or it is computed with."
-    )
-    negative_interval: Literal["hold", "refuse", "zero"] = Field(
-        default="hold", description="A negative interval: nothing is done, an error is raised, or it counts as zero."
-    )
+    signal: Annotated[
+        Literal["hold", "propagate", "nan", "zero"],
+        means(
+            "Setpoint or measurement is NaN or infinite: `hold` the output, nothing is computed and the state stands "
+            "still; `propagate`: it is computed with; `nan`, `zero`: that is the output for this scan, and the state stands still."
+        ),
+    ] = "hold"
+    zero_interval: Annotated[
+        Literal["hold", "compute"],
+        means("An interval of zero: nothing is done and the last output stands, or it is computed with."),
+    ] = "hold"
+    negative_interval: Annotated[
+        Literal["hold", "refuse", "zero"], means("A negative interval: nothing is done, an error is raised, or it counts as zero.")
+    ] = "hold"
 
 
 def _arithmetic(arithmetic: Any) -> str | None:
@@ -60,18 +62,19 @@ class Arithmetic(Part):
     ] = None
 
 
-class ActionExample(Model):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActionExample(Part):
     """One scan that shows which way the output moves, since vendors disagree on the words."""
 
-    name: Name = Field(description="The vendor's word, one of `names`.")
-    sp: Number = Field(description="Setpoint; the measurement starts there.")
-    pv: Number = Field(description="Measurement at the next scan.")
-    output: Literal["rises", "falls"] = Field(description="Which way the output moves.")
+    name: Annotated[Name, means("The vendor's word, one of `names`.")]
+    sp: Annotated[Number, means("Setpoint; the measurement starts there.")]
+    pv: Annotated[Number, means("Measurement at the next scan.")]
+    output: Annotated[Literal["rises", "falls"], means("Which way the output moves.")]
 
 
 def _both(names: dict[str, str]) -> dict[str, str]:
     if len(names) < 2:
-        raise PydanticCustomError("two_names", "names needs both 'reverse' and 'direct'")
+        raise refusal("two_names", "names needs both 'reverse' and 'direct'")
     return names
 
 
@@ -95,7 +98,7 @@ class Action(Part):
         ),
     ] = "sp - pv"
     names: Annotated[
-        Annotated[dict[Literal["reverse", "direct"], Name], AfterValidator(_both)],
+        Annotated[dict[Literal["reverse", "direct"], Name], Only(after=_both)],
         means("The vendor's words for reverse acting (output falls when the measurement rises) and direct acting."),
     ]
     example: Annotated[ActionExample, means("One scan that shows the meaning of the words; a test runs it.")]
@@ -106,15 +109,15 @@ class Action(Part):
         return -1.0 if self.fixed and self.reverse == "pv - sp" else 1.0
 
 
-class Scan(Model):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scan(Part):
     """Scan interval."""
 
-    default: Name = Field(description="Interval used when none is given, such as `1 s`.")
-    interval: Literal["nominal", "measured"] = Field(
-        default="nominal",
-        description="What the equations use where scans come unevenly: the nominal interval, or the one measured since the last "
-        "scan.",
-    )
+    default: Annotated[Name, means("Interval used when none is given, such as `1 s`.")]
+    interval: Annotated[
+        Literal["nominal", "measured"],
+        means("What the equations use where scans come unevenly: the nominal interval, or the one measured since the last scan."),
+    ] = "nominal"
 
 
 def _rate(output: Any) -> str | None:

@@ -9,9 +9,8 @@ import importlib
 import pkgutil
 from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 
-from pydantic import Field
-
 from pidemu.card.model.base import R
+from pidemu.card.model.declared import ByScheme
 from pidemu.card.windup.scheme import Scheme
 
 __all__ = ["SCHEMES", "Scheme", "Windup"]
@@ -34,4 +33,4 @@ SCHEMES: Final = _schemes()
 if TYPE_CHECKING:
     Windup = Scheme
 else:
-    Windup = Annotated[Union[tuple(scheme[R] for scheme in SCHEMES)], Field(discriminator="scheme")]  # noqa: UP007
+    Windup = Annotated[Union[tuple(scheme[R] for scheme in SCHEMES)], ByScheme()]  # noqa: UP007

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Generic, Literal
 
-from pydantic import Field
-
 from pidemu.card.model.base import Given, Part, R, Reference, Rule, means
+from pidemu.card.model.declared import Only
 from pidemu.card.model.marks import Beyond, Names
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
@@ -21,7 +20,7 @@ class FastReturn(Part, Generic[R]):
 
     factor: Annotated[
         float,
-        Field(ge=1, le=1e6, strict=True, allow_inf_nan=False),
+        Only(ge=1, le=1e6, strict=True, allow_inf_nan=False),
         means(
             "The integral time is divided by this while the output is beyond one of the limits and the integral on its "
             "way back, until the output is back at that limit."

@@ -1,7 +1,8 @@
-"""The folder for generated code: what a back end compiled once is there the next time, and nothing else is ever loaded from it.
+"""The cache folder: what was compiled once, code or a card, is there the next time, and nothing else is ever loaded from it.
 
 Compiled code runs when it is loaded. So the folder is one that nobody else can write to, its files are this user's own, and the
 name of each holds the SHA-256 of what is in it: one that is damaged, cut short or put there by another is not loaded but made anew.
+Compiled cards are data and lie in a folder of their own within it (`pidemu.card.store`).
 """
 
 from __future__ import annotations
@@ -35,11 +36,8 @@ def folder() -> Path:
     OSError
         There is no room for a temporary folder either, or others could exchange it.
     """
-    import platformdirs
-
     try:
-        chosen = os.environ.get("PIDEMU_CACHE") or platformdirs.user_cache_dir("pidemu", appauthor=False)
-        path = Path(os.path.realpath(Path(chosen).expanduser())) / __version__
+        chosen, path = _chosen()
         fault = _fault(path) or _fault(_made(path))  # nothing is made where others could exchange it
         if fault:
             warn(f"{chosen}: not used for compiled code, as {fault}; name a folder of your own in PIDEMU_CACHE")
@@ -57,6 +55,37 @@ def folder() -> Path:
     return path
 
 
+def private(name: str, *, make: bool = False) -> Path | None:
+    """Return a folder of this name within the cache folder, for data; ``None`` where there is none, or others can write to it.
+
+    Unlike `folder` it says nothing and has no substitute: what would be kept there is computed again.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    make : bool
+        Whether it is made where it is not there.
+    """
+    try:
+        path = _chosen()[1] / name
+        if _fault(path) or (make and _fault(_made(path))):
+            return None
+    except (OSError, RuntimeError, ValueError):  # see `folder`
+        return None
+    return path
+
+
+def _chosen() -> tuple[str, Path]:
+    """Return the folder that the user or the system names, and the one in it for this version of pidemu."""
+    chosen = os.environ.get("PIDEMU_CACHE")
+    if not chosen:
+        import platformdirs
+
+        chosen = platformdirs.user_cache_dir("pidemu", appauthor=False)
+    return chosen, Path(os.path.realpath(Path(chosen).expanduser())) / __version__
+
+
 def load(stem: str, suffix: str) -> tuple[Path, bytes] | None:
     """Return a file of the folder and what it holds, or ``None``; one that does not hold what its name says is removed.
 
@@ -66,7 +95,7 @@ def load(stem: str, suffix: str) -> tuple[Path, bytes] | None:
         What it was kept under.
     """
     for path in _candidates(stem, suffix):
-        data = _own(path)
+        data = own(path)
         if data is not None and path.name == _name(stem, suffix, data):
             return path, data
         _remove(path)
@@ -99,7 +128,17 @@ def keep(stem: str, suffix: str, data: bytes) -> Path:
     OSError
         It cannot be written.
     """
-    path = folder() / _name(stem, suffix, data)
+    return put(folder() / _name(stem, suffix, data), data)
+
+
+def put(path: Path, data: bytes) -> Path:
+    """Write a file of a private folder beside its place and put it there at once.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
     handle, unfinished = tempfile.mkstemp(dir=path.parent, suffix=".unfinished")  # nobody else may read or write it
     try:
         with open(handle, "wb") as file:
@@ -128,7 +167,7 @@ def _candidates(stem: str, suffix: str) -> list[Path]:
         return []
 
 
-def _own(path: Path) -> bytes | None:
+def own(path: Path) -> bytes | None:
     """Return what a file holds; ``None`` where it cannot be read, or is not a file of this user's that only he can write."""
     try:
         found = path.lstat()

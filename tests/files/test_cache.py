@@ -14,7 +14,8 @@ import platformdirs
 import pytest
 
 import pidemu
-from pidemu.backends import cache, native
+from pidemu.backends import native
+from pidemu.files import cache
 
 
 @pytest.fixture(autouse=True)
@@ -57,7 +58,7 @@ def in_another_process(**environment: str) -> Path:
             "-W",
             "error",
             "-c",
-            "import pidemu.backends.cache as c; p = c.keep('a', '.b', b'x'); assert p.exists(); print(p)",
+            "import pidemu.files.cache as c; p = c.keep('a', '.b', b'x'); assert p.exists(); print(p)",
         ],
         capture_output=True,
         text=True,
