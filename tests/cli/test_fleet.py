@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -299,19 +300,21 @@ def test_there_must_be_something_to_go_on_with() -> None:
 
 
 @pytest.mark.parametrize("damage", ["emptied", "cut short", "a bit turned"])
-def test_a_damaged_cache_is_no_matter_to_a_fleet(damage: str, folder: Path) -> None:
+@pytest.mark.parametrize(("engine", "ending"), [("numba", ".numba"), ("c", ".so")])
+def test_a_damaged_cache_is_no_matter_to_a_fleet(engine: str, ending: str, damage: str, folder: Path) -> None:
     """With Numba's own files it ended with status 130 and without a word."""
-    pytest.importorskip("numba")
+    if engine == "c" and shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
     (folder / "long.csv").write_text(HEAD + SLOW.replace(",1,\n", ",1,1e7\n"), encoding="utf-8")
-    command = [sys.executable, "-m", "pidemu", "fleet", "long.csv", "-v", "--table", "out.csv"]
+    command = [sys.executable, "-m", "pidemu", "fleet", "long.csv", "--engine", engine, "--table", "out.csv"]
     environment = {**os.environ, "PIDEMU_CACHE": str(folder / "code")}
     found = []
     for _ in range(2):
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
         assert (done.returncode, done.stderr) == (0, "")
-        assert "engine: numba (1 loop)" in done.stdout
+        assert f"engine: {engine} (1 loop)" in done.stdout
         found.append((done.stdout, rows("out.csv")))
-        for path in (folder / "code").rglob("*.numba"):
+        for path in (folder / "code").rglob(f"*{ending}"):
             sound = path.read_bytes()
             middle = len(sound) // 2
             turned = sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :]
