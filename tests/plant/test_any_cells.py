@@ -6,7 +6,8 @@ import random
 from pathlib import Path
 
 from pidemu.plant.decisions import Decisions
-from pidemu.plant.job import convert_lists, read_lists
+from pidemu.plant.job import convert_lists
+from pidemu.plant.loop_list import read_lists
 from pidemu.plant.mapping import PlantWords
 from pidemu.plant.rules import read_rules
 from pidemu.plant.sources import read_sources

@@ -196,3 +196,16 @@ def test_l5k_text_that_does_not_fit_is_the_loops_error(text: str) -> None:
 def test_elements_nested_too_deeply_are_refused() -> None:
     with pytest.raises(ListError, match="more elements, or deeper ones"):
         read_l5x(controller("<a>" * 300 + "</a>" * 300), "x.L5X")
+
+
+@pytest.mark.parametrize("encoding", ["UTF-9", "utf-7", "big5", ""])
+def test_an_encoding_that_cannot_be_read_is_refused(encoding: str) -> None:
+    with pytest.raises(ListError, match=r"^x\.L5X:1"):
+        read_l5x(f'<?xml version="1.0" encoding="{encoding}"?>'.encode() + controller(""), "x.L5X")
+
+
+def test_a_number_beyond_32_bits_is_left_as_it_is() -> None:
+    members = "".join(f'<DataValueMember Name="{name}" Value="1e300"/>' for name in ("KP", "KI", "KD"))
+    data = f'<Data Format="Decorated"><Structure DataType="PID"><DataValueMember Name="CTL" Value="0"/>{members}</Structure></Data>'
+    (loop,) = read_l5x(controller(f'<Tags><Tag Name="A" DataType="PID">{data}</Tag></Tags>'), "x.L5X").loops
+    assert loop.values.settings == dict.fromkeys(("KP", "KI", "KD"), 1e300)

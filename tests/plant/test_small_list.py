@@ -11,7 +11,8 @@ import pytest
 import pidemu
 from pidemu.plant.converting import as_ranged
 from pidemu.plant.decisions import Decisions
-from pidemu.plant.job import RetrofitResult, attempt, read_lists
+from pidemu.plant.job import RetrofitResult, attempt
+from pidemu.plant.loop_list import read_lists
 from pidemu.plant.mapping import read_mapping
 from pidemu.plant.rules import read_rules
 from pidemu.plant.sources import read_sources

@@ -161,6 +161,12 @@ def test_entities_in_a_workbook_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "x.xlsx", packed({**parts, "xl/worksheets/sheet1.xml": sheet}), "declares a document type or entities")
 
 
+def test_an_encoding_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    parts = parts_of(write(tmp_path / "list.xlsx", [list(HEADER), cells()]))
+    sheet = parts["xl/worksheets/sheet1.xml"].replace(b"UTF-8", b"UTF-9", 1)
+    refused(tmp_path / "x.xlsx", packed({**parts, "xl/worksheets/sheet1.xml": sheet}), "unknown encoding: UTF-9")
+
+
 @pytest.mark.parametrize("keep", [100, 1000, 3000])
 def test_a_workbook_that_is_cut_off_is_refused(keep: int, tmp_path: Path) -> None:
     data = write(tmp_path / "list.xlsx", [list(HEADER), cells()]).read_bytes()

@@ -20,6 +20,7 @@ COUNTS = {
     "conversions": 30,
     "signals": 200,
     "certificates": 40,
+    "plants": 60,
 }
 SEED = 2026
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -34,6 +34,8 @@ _FILES: Final = {
     "workbook.xlsx": "all of it, for the configuration team",
 }
 _SHOWN: Final = 10
+_MANY: Final = 100
+"""Loops from which on the progress is shown."""
 
 
 @click.command("retrofit", short_help="Convert a plant's loop lists, every line accounted for.")
@@ -106,20 +108,20 @@ def command(
 
 
 def _run(lists: tuple[str, ...], rules: PlantRules, words: PlantWords, decided: Decisions) -> RetrofitResult:
-    """Read and convert; on a terminal the progress is shown."""
+    """Read and convert; of many loops the progress is shown on a terminal."""
+    from pidemu.fleet.progress import Progress
     from pidemu.plant.job import retrofit
 
-    if sys.stderr is None or not sys.stderr.isatty():
-        return retrofit(lists, rules=rules, mapping=words, decisions=decided)
-    started = time.monotonic()
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    with contextlib.ExitStack() as stack:
+        bars: list[Progress] = []
 
-    def show(done: int, of: int) -> None:
-        if done % 20 and done != of:
-            return
-        rate = done / max(time.monotonic() - started, 1e-9)
-        click.echo(f"\r{done:,} of {of:,} loops, {rate:.0f} loops/s, {(of - done) / rate:.0f} s left   ", nl=done == of, err=True)
+        def show(_done: int, of: int) -> None:
+            if not bars:
+                bars.append(stack.enter_context(Progress(of, terminal and of >= _MANY)))
+            bars[0].advance(1)
 
-    return retrofit(lists, rules=rules, mapping=words, decisions=decided, progress=show)
+        return retrofit(lists, rules=rules, mapping=words, decisions=decided, progress=show)
 
 
 def _list_rules() -> None:

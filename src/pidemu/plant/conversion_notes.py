@@ -8,10 +8,10 @@ from typing import Final
 from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.conversion.result import Conversion
 from pidemu.plant.decisions import Decisions, is_nearest_wanted, note_decision
-from pidemu.plant.loop_settings import times_of
 from pidemu.plant.pv_filter import filter_time
 from pidemu.plant.reading_model import LoopChoice, LoopReading
 from pidemu.plant.rules import LoopRules, PlantRules
+from pidemu.plant.settings_notes import times_of
 
 _MOVED: Final = 1e-3
 """Share of a setting that rounding may move it by without a word."""

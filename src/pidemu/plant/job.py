@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from pidemu.card.load import Card
-from pidemu.errors import ListError, PidemuError
 from pidemu.files.tables import counted
 from pidemu.plant.codes import CODES
 from pidemu.plant.converting import LoopConversion, as_ranged, convert_loop
 from pidemu.plant.decisions import SKIP, Decisions, note_decision, pass_over, read_decisions
-from pidemu.plant.layout import ListLayout, find_layout
-from pidemu.plant.lines import LoopLine, SkippedLine, skipped_sheet, split_sheet
-from pidemu.plant.loop_cells import LoopCells
+from pidemu.plant.duplicates import note_duplicates
+from pidemu.plant.lines import SkippedLine
+from pidemu.plant.loop_list import Again, LoopList, read_lists
 from pidemu.plant.mapping import PlantWords, read_mapping
 from pidemu.plant.outcomes import with_outcomes
-from pidemu.plant.reading import ask_structures, read_loop
-from pidemu.plant.reading_model import LoopChoice, LoopReading
+from pidemu.plant.reading import ask_structures
+from pidemu.plant.reading_model import LoopReading, fault_in_words
 from pidemu.plant.rows import RetrofitRow, level_of, row_of
 from pidemu.plant.rules import PlantRules, read_rules
-from pidemu.plant.sources import LoopSource, read_sources
+from pidemu.plant.sources import read_sources
 
-Again = Callable[[Decisions], LoopReading]
-"""Reads a loop again, with other decisions."""
-ReadLoop = tuple[LoopReading, Again]
 _CLASSES: Final = ("converted", "decision", "error", "skipped")
 
 
@@ -87,31 +83,6 @@ class RetrofitResult(NamedTuple):
     summary: RetrofitSummary
 
 
-@dataclass
-class LoopList:
-    """All loops of a job, read and not yet converted.
-
-    Attributes
-    ----------
-    loops : list
-        Each loop with what reads it again.
-    skipped : list of SkippedLine
-        The other lines.
-    layouts : list of ListLayout
-        How the sheets are laid out.
-    notes : list of str
-        How the files were read.
-    files : dict
-        SHA-256 by file.
-    """
-
-    loops: list[ReadLoop] = field(default_factory=list)
-    skipped: list[SkippedLine] = field(default_factory=list)
-    layouts: list[ListLayout] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    files: dict[str, str] = field(default_factory=dict)
-
-
 def retrofit(
     table: str | Path | Sequence[str | Path],
     *,
@@ -162,74 +133,6 @@ def retrofit(
     return convert_lists(listed, ruled, words, decided, progress)
 
 
-def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Decisions) -> LoopList:
-    """Read the loops of files.
-
-    Parameters
-    ----------
-    sources : iterable of LoopSource
-        The files.
-    words : PlantWords
-        What the plant's words mean.
-    decisions : Decisions
-        What people decided.
-
-    Raises
-    ------
-    ListError
-        No line of a file is a header of loops.
-    """
-    found = LoopList()
-    sources = list(sources)
-    for source in sources:
-        found.files[source.file] = source.digest
-        layouts = list(_layouts(source, words, found))
-        for layout in layouts:
-            loops, skipped = split_sheet(layout)
-            found.skipped += skipped
-            found.loops += [_readable(loop, layout, words, decisions) for loop in loops]
-        if source.export is None and not layouts:
-            raise ListError(
-                f"{source.file}: no header was found: a line that names a tag and a gain or an integral setting, and two "
-                f"columns more; "
-                "name the line and the columns in the mapping (header-lines:, columns:)"
-            )
-    exports = [source.export for source in sources if source.export is not None]
-    if exports:
-        from pidemu.plant.l5x.readings import readings_of_exports
-
-        for reading, again in readings_of_exports(exports, decisions):
-            found.loops.append((reading, again))
-        found.notes += [note for export in exports for note in export.notes]
-    return found
-
-
-def _layouts(source: LoopSource, words: PlantWords, found: LoopList) -> Iterator[ListLayout]:
-    for sheet in source.sheets:
-        found.notes += [f"{sheet.shown}: {note}" for note in sheet.notes]
-        if not words.is_read(sheet.name, sheet.hidden):
-            found.skipped += skipped_sheet(sheet, "hidden sheet" if sheet.hidden else "superseded sheet")
-            continue
-        layout = find_layout(sheet, words.columns_of(sheet.name), words.header_of(sheet.name))
-        if layout is None:
-            found.skipped += skipped_sheet(sheet, "no list")
-            continue
-        found.layouts.append(layout)
-        yield layout
-
-
-def _readable(loop: LoopLine, layout: ListLayout, words: PlantWords, decisions: Decisions) -> ReadLoop:
-    def again(other: Decisions) -> LoopReading:
-        try:
-            return read_loop(loop, layout, words, other)
-        except Exception as error:  # a fault of one line costs no other
-            lost = LoopReading(layout.sheet.file, layout.sheet.name, loop.line.number, LoopCells(loop, layout).text("tag"))
-            lost.find("E-program", f"the line could not be read: {_shown(error)}")
-            return lost
-
-    return again(decisions), again
-
-
 def convert_lists(
     listed: LoopList,
     rules: PlantRules,
@@ -250,7 +153,7 @@ def convert_lists(
     """
     readings = [reading for reading, _ in listed.loops]
     ask_structures(readings, words, decisions)
-    dropped = _note_duplicates(readings, decisions)
+    dropped = note_duplicates(readings, decisions)
     rows = []
     for number, (reading, again) in enumerate(listed.loops, 1):
         rows.append(_row(reading, again, rules, decisions, id(reading) in dropped))
@@ -286,50 +189,8 @@ def attempt(reading: LoopReading, rules: PlantRules, decisions: Decisions) -> Lo
         as_ranged(reading)
         return convert_loop(reading, rules, decisions)
     except Exception as error:  # a fault of one loop costs no other
-        reading.find("E-program", f"the loop could not be converted: {_shown(error)}")
+        reading.find("E-program", f"the loop could not be converted: {fault_in_words(error)}")
         return None
-
-
-def _shown(error: Exception) -> str:
-    return str(error) if isinstance(error, PidemuError) else f"{type(error).__name__}: {error}"
-
-
-def _note_duplicates(readings: Sequence[LoopReading], decisions: Decisions) -> set[int]:
-    """Note tags that stand in the lists more than once; return the lines that a person dropped, by identity."""
-    by_tag: dict[str, list[LoopReading]] = defaultdict(list)
-    for reading in readings:
-        if reading.tag:
-            by_tag["".join(str(reading.facts.get("key") or reading.tag).split()).casefold()].append(reading)
-    dropped: set[int] = set()
-    for same in by_tag.values():
-        if len(same) < 2:
-            continue
-        if len({r.contents for r in same}) == 1:
-            for other in same[1:]:
-                other.find("F-repeat", f"the same as {_where(same[0])}; it counts once")
-            continue
-        decided = decisions.answer(same[0].tag, "D-duplicate")
-        chosen = [r for r in same if decided is not None and decided.answer.strip() in _names(r)]
-        if decided is not None and len(chosen) == 1:
-            note_decision(chosen[0], decided)
-            dropped |= {id(r) for r in same if r is not chosen[0]}
-            continue
-        for reading in same:
-            others = ", ".join(_where(r) for r in same if r is not reading)
-            choices = tuple(LoopChoice(_names(r)[0], _where(r)) for r in same)
-            text = f"{reading.tag} stands with other contents in {others}. Which counts?"
-            reading.find("D-duplicate", text, f"line {reading.line}", choices=choices)
-    return dropped
-
-
-def _names(reading: LoopReading) -> tuple[str, ...]:
-    """Return what names a line in an answer."""
-    line = str(reading.line)
-    return (f"{reading.sheet}:{line}" if reading.sheet else line, line, f"{reading.file}:{line}")
-
-
-def _where(reading: LoopReading) -> str:
-    return f"{reading.file}{f', {reading.sheet}' if reading.sheet else ''}, line {reading.line}"
 
 
 def _summary(rows: Sequence[RetrofitRow], listed: LoopList) -> RetrofitSummary:

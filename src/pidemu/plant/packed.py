@@ -100,6 +100,8 @@ def _parsed(archive: zipfile.ZipFile, part: str, file: str, start: Callable[[str
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         raise ListError(f"{file} ({part}):{error.lineno}: damaged ({expat.errors.messages[error.code]}); save it again") from None
+    except LookupError as error:  # an encoding that there is not
+        raise ListError(f"{file} ({part}): {error}; save it again") from None
 
 
 def safe_parser(name: str, encoding: str | None = None) -> Any:

@@ -12,7 +12,7 @@ from pidemu.plant.decisions import Decisions, note_decision, pass_over
 from pidemu.plant.layout import ListLayout
 from pidemu.plant.lines import LoopLine
 from pidemu.plant.loop_cells import LoopCells
-from pidemu.plant.loop_settings import StatedLoop, note_settings, read_settings
+from pidemu.plant.loop_settings import read_settings
 from pidemu.plant.loop_signals import (
     read_action,
     read_filter,
@@ -25,7 +25,9 @@ from pidemu.plant.loop_signals import (
 )
 from pidemu.plant.mapping import PlantWords
 from pidemu.plant.reading_model import LoopChoice, LoopReading
+from pidemu.plant.settings_notes import note_settings
 from pidemu.plant.source_options import decisive, stated_options
+from pidemu.plant.stated_loop import StatedLoop
 from pidemu.plant.words import beyond_pid, says_unused
 from pidemu.settings.settings import Settings
 from pidemu.units import Role

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pidemu.card.load import Card
+from pidemu.errors import PidemuError
 from pidemu.plant.codes import CODES, Level
 from pidemu.settings.action import Action
 from pidemu.settings.ranges import SignalRange
@@ -189,3 +190,8 @@ class LoopReading:
     def stops(self, *levels: Level) -> bool:
         """Whether a finding has one of these levels."""
         return any(f.level in levels for f in self.findings)
+
+
+def fault_in_words(error: Exception) -> str:
+    """Return an error as a finding tells it; one that is none of ours with its kind."""
+    return str(error) if isinstance(error, PidemuError) else f"{type(error).__name__}: {error}"

@@ -14,6 +14,7 @@ Positional = str | list["Positional"]
 _RADIX: Final = re.compile(r"(2|8|16)#([0-9A-Fa-f_]+)")
 _TOKEN: Final = re.compile(r"\s*([\[\],]|'(?:[^'$]|\$.)*'|[^\[\],\s]+)")
 _DEEPEST: Final = 100
+_LARGEST: Final = float(np.finfo(np.float32).max)
 
 
 def read_real(text: str) -> float:
@@ -47,8 +48,7 @@ def shortest(x: float) -> float:
     >>> shortest(9.99999978e-003)
     0.01
     """
-    found = float(str(np.float32(x)))
-    return found if math.isfinite(found) else x
+    return x if abs(x) > _LARGEST else float(str(np.float32(x)))
 
 
 def read_word(text: str) -> int:

@@ -12,9 +12,9 @@ from pidemu.errors import PidemuError
 from pidemu.plant.decisions import Decisions, note_decision, pass_over
 from pidemu.plant.l5x.execution import CONTROLLER
 from pidemu.plant.l5x.loops import L5xExport, L5xLoop
-from pidemu.plant.loop_settings import note_settings
 from pidemu.plant.reading import take_bias
 from pidemu.plant.reading_model import LoopChoice, LoopReading, ValueOrigin
+from pidemu.plant.settings_notes import note_settings
 from pidemu.settings.ranges import SignalRange
 
 _FAULTS: Final = {"not-a-number": "E-number", "bits-contradict-CTL": "E-bits", "no-members": "E-missing"}

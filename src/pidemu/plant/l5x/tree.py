@@ -86,6 +86,8 @@ def read_tree(data: bytes, file: str) -> L5xElement:
         why = expat.errors.messages[error.code]
         cut = " (the file is cut off, or was changed by hand)" if error.code in _CUT else ""
         raise ListError(f"{file}:{error.lineno}:{error.offset + 1}: {why}{cut}; export it again") from None
+    except (LookupError, ValueError) as error:  # what expat has no table for
+        raise ListError(f"{file}:1: {error}; export it again, in UTF-8") from None
     if builder.root is None:  # expat says so first
         raise ListError(f"{file}: holds no element; export it again")
     return builder.root
