@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, Self, TypeVar, cast
 
 from pidemu.card.model.base import GENERAL_RULES, Given, Part, R, Reference, Rule
+from pidemu.card.model.part import part
 from pidemu.numeric import Real, X
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class NumberSource(Protocol[N_co]):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Scheme(Part, Generic[R]):
     """A windup scheme: what happens to the integral at an output limit (specs/equations.md, section 5).
 
