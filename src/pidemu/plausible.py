@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
 from typing import Any, Final
 
 from pidemu.errors import PidemuError
 from pidemu.excerpt import quoted
+from pidemu.part import part
 
 _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?")
@@ -24,7 +24,7 @@ _LONGEST: Final = 40
 """Characters of what was given that a message repeats."""
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class PlausibleSize:
     """How large the values of a quantity can be, apart from 0.
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
 from pidemu.card.model.marks import Names
-from pidemu.card.model.part import part
+from pidemu.part import part
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
 

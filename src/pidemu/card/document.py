@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pidemu.card.model.part import part
 from pidemu.errors import CardError, Problem
 from pidemu.excerpt import is_hidden
 from pidemu.files.reading import Kind
+from pidemu.part import part
 
 Path_ = tuple[str | int, ...]
 """Keys and indices that lead to a value."""

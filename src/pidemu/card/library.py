@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from pidemu.card import store
 from pidemu.card.document import CARD, card_id_of, digest_of, wrong_id
-from pidemu.card.model.part import part
 from pidemu.errors import CardError, CardNotFoundError, Problem, suggest
 from pidemu.excerpt import shortened, visible
 from pidemu.files.reading import read_text
+from pidemu.part import part
 
 if TYPE_CHECKING:
     from pidemu.card.load import Card

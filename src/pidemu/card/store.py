@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu import __version__
-from pidemu.card.model.part import part
 from pidemu.files import cache
+from pidemu.part import part, part_of
 
 if TYPE_CHECKING:
     from pidemu.card.model.card_file import CardFile, Equation
@@ -91,7 +91,7 @@ class Compiled:
         """Return the equation for choices of all options."""
         from pidemu.card.model.card_file import Equation
 
-        return Equation(**{name: self._piece(i) for name, i in self.equations[_key(chosen)].items()})
+        return part_of(Equation, {name: self._piece(i) for name, i in self.equations[_key(chosen)].items()})
 
     def _piece(self, i: int) -> Any:
         from pidemu.card.plain_data import decoded

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, cast
 
 from pidemu.card.model.declared import Means, Only, refusal
-from pidemu.card.model.part import part
+from pidemu.part import part
 
 SMALLEST: Final = 1e-40
 LARGEST: Final = 1e40

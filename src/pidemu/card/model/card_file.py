@@ -14,10 +14,10 @@ from pidemu.card.model.declared import Only
 from pidemu.card.model.integral import Integral
 from pidemu.card.model.marks import PerScan
 from pidemu.card.model.operation import Action, Arithmetic, Faults, Output, Scan
-from pidemu.card.model.part import part
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint
 from pidemu.card.model.terms import Cascade, Derivative, Feedforward, Proportional
 from pidemu.card.transfer import Transfer
+from pidemu.part import part
 from pidemu.units import Role, parse_quantity, to_canonical
 
 

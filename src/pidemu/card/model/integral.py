@@ -6,8 +6,8 @@ from typing import Annotated, Any, Generic, Literal
 
 from pidemu.card.model.base import GeneralRule, Part, R, means
 from pidemu.card.model.marks import AtRest, Beyond, Names, PerScan
-from pidemu.card.model.part import part
 from pidemu.card.windup import Windup
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)

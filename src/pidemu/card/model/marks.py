@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import Annotated, Any, TypeVar
 
 from pidemu.card.model.declared import Means
-from pidemu.card.model.part import part
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal
 from pidemu.card.model.base import Count, Flag, Name, Number, Part, R, means
 from pidemu.card.model.declared import Only, refusal
 from pidemu.card.model.marks import Beyond, Names
-from pidemu.card.model.part import part
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)

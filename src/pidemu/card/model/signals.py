@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal
 
 from pidemu.card.model.base import Flag, GeneralRule, Part, R, Rule, Size, means
 from pidemu.card.model.marks import AtRest, Beyond, Names, PerScan
-from pidemu.card.model.part import part
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Generic, Literal
 
 from pidemu.card.model.base import Flag, GeneralRule, Part, R, Rule, means
 from pidemu.card.model.marks import AtRest, Names, PerScan
-from pidemu.card.model.part import part
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pidemu.card.model.base import Part, means
 from pidemu.card.model.marks import AtRest
-from pidemu.card.model.part import part
 from pidemu.card.transfer.start import Start
+from pidemu.part import part
 
 __all__ = ["STARTS", "Start", "Transfer"]
 

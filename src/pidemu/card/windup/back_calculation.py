@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pidemu.card.model.base import Flag, Given, R, Reference, means, short
 from pidemu.card.model.marks import Names
-from pidemu.card.model.part import part
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
+from pidemu.part import part
 from pidemu.units import Dimension, parse_unit
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, Generic, Literal
 from pidemu.card.model.base import Given, Part, R, Reference, Rule, means
 from pidemu.card.model.declared import Only
 from pidemu.card.model.marks import Beyond, Names
-from pidemu.card.model.part import part
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
-from pidemu.card.model.part import part
 from pidemu.card.windup.scheme import Scheme
+from pidemu.part import part
 
 if TYPE_CHECKING:
     from pidemu.card.model.card_file import Equation

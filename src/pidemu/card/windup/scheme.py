@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, Self, TypeVar, cast
 
 from pidemu.card.model.base import GENERAL_RULES, Given, Part, R, Reference, Rule
-from pidemu.card.model.part import part
 from pidemu.numeric import Real, X
+from pidemu.part import part
 
 if TYPE_CHECKING:
     from pidemu.card.model.card_file import Equation

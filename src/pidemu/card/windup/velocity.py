@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
 from pidemu.card.model.base import Flag, Given, R, Reference, means
-from pidemu.card.model.part import part
 from pidemu.card.windup.scheme import Scheme
+from pidemu.part import part
 
 
 @part(frozen=True, slots=True, kw_only=True)
