@@ -15,6 +15,15 @@ def json_safe(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def number(x: float, digits: int = 6) -> str:
+    """Return a number in so many significant digits, as people write it."""
+    if math.isinf(x):
+        return "inf" if x > 0 else "-inf"
+    x = float(f"{x:.{digits}g}") if digits < 6 else x
+    text = f"{x:.{max(digits, 6)}g}"
+    return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
+
+
 def exactly(x: float) -> str:
     """Return a number that reads back as the same one."""
     short = f"{x:.12g}"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from typing_extensions import TypeVar
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar as TypeVarWithDefault
 
 
 class Real(Protocol):
@@ -21,5 +22,8 @@ class Real(Protocol):
     def __neg__(self) -> Any: ...
 
 
-X = TypeVar("X", bound=Real, default=float)
+if TYPE_CHECKING:
+    X = TypeVarWithDefault("X", bound=Real, default=float)
+else:  # defaults of type variables begin with Python 3.13, and the package that has them before costs every command
+    X = TypeVar("X", bound=Real)
 """Kind of the numbers: ``Algorithm`` has floats, ``Algorithm[Exact]`` numbers without rounding, ``Algorithm[Floats]`` columns."""

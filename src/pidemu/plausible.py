@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
 from typing import Any, Final
@@ -18,6 +17,7 @@ from pidemu.columns.functions import as_written, isfinite
 from pidemu.columns.traced import Traced
 from pidemu.errors import PidemuError
 from pidemu.excerpt import quoted
+from pidemu.part import part
 
 _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?")
@@ -26,7 +26,7 @@ _LONGEST: Final = 40
 """Characters of what was given that a message repeats."""
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class PlausibleSize:
     """How large the values of a quantity can be, apart from 0.
 

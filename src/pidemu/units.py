@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache, partial
@@ -35,6 +35,7 @@ from typing import Any, Final
 from pidemu.columns.functions import each, is_traced, isfinite, isinf, isnan, plain, sign_of
 from pidemu.errors import UnitError, suggest
 from pidemu.excerpt import quoted
+from pidemu.part import part
 from pidemu.plausible import plain_number
 
 
@@ -93,7 +94,7 @@ OF_MEASUREMENT: Final = (Role.DEADBAND, Role.SETPOINT_RATE)
 """Levels and rates of the measurement; the others are the output's."""
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Unit:
     """A unit of a dial.
 
@@ -128,7 +129,7 @@ class Unit:
         }.get(self.dimension, "degrees per time")
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Spans:
     """What a dial's unit may refer to: the widths of the signal ranges and the scan interval.
 

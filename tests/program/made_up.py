@@ -13,11 +13,11 @@ SCHEME = '''
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
 from pidemu.card.model.marks import Names
+from pidemu.part import part
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pidemu.card.model.card_file import Equation
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupMadeUp(Scheme[R]):
     """At a limit a part of the integral is kept."""
 

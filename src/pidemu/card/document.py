@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from pidemu.errors import CardError, Problem
+from pidemu.excerpt import is_hidden
 from pidemu.files.reading import Kind
+from pidemu.part import part
 
 Path_ = tuple[str | int, ...]
 """Keys and indices that lead to a value."""
 
+_LONGEST_ID: Final = 200
 CARD: Final = Kind("a card", "a card starts with 'card: 1'", limit=2**22, pipes=False)
 
 
@@ -21,7 +24,21 @@ def digest_of(text: str) -> str:
     return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
+def wrong_id(card_id: str) -> str | None:
+    """Return what is wrong with a card's id, which are the names of its folder and file."""
+    if any(is_hidden(c) for c in card_id):
+        return "the name of the file or folder has characters that cannot be seen; rename it"
+    if len(card_id) > _LONGEST_ID:
+        return f"the names of folder and file have {len(card_id)} characters; at most {_LONGEST_ID} are allowed"
+    return None
+
+
+def card_id_of(path: Path) -> str:
+    """Return the id of the card in a file, by the last two parts of its path."""
+    return f"{path.parent.name}/{path.stem}"
+
+
+@part(frozen=True, slots=True)
 class Place:
     """Where a key or value stands: 1-based line and column, and its width on that line."""
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING
 
 from pidemu.card import store
-from pidemu.card.document import CARD, digest_of
-from pidemu.card.load import Card, keep, load_file, status_counts, wrong_id
+from pidemu.card.document import CARD, card_id_of, digest_of, wrong_id
 from pidemu.errors import CardError, CardNotFoundError, Problem, suggest
 from pidemu.excerpt import shortened, visible
 from pidemu.files.reading import read_text
+from pidemu.part import part
+
+if TYPE_CHECKING:
+    from pidemu.card.load import Card
 
 ENVIRONMENT = "PIDEMU_VENDORS"
 """Folders of cards, separated like PATH, searched before the built-in ones."""
@@ -192,6 +195,8 @@ def _not_found(name: str, vendors: Sequence[str | Path]) -> CardNotFoundError:
 
 def _read(file: Path, card_id: str | None) -> Card | CardError:
     """Return the card of a file, or what is wrong with it; the built-in ones are checked when they are built in."""
+    from pidemu.card.load import keep, load_file
+
     try:
         card = load_file(file, card_id)
     except CardError as error:
@@ -205,11 +210,23 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
     return CardError(problems) if problems else card
 
 
+def is_known_good(file: Path, card_id: str | None = None) -> bool:
+    """Tell whether a check of this very card by this very pidemu had nothing to say.
+
+    Raises
+    ------
+    CardError
+        The file cannot be read, or is no text.
+    """
+    path = Path(os.path.realpath(file))
+    return store.is_checked(digest_of(read_text(path, CardError, CARD, shown=str(file))), card_id or card_id_of(path))
+
+
 def _is_builtin(file: Path) -> bool:
     return file.resolve().is_relative_to(builtin_folder().resolve())
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class CardEntry:
     """What a list of cards says of one.
 
@@ -237,6 +254,8 @@ def card_entry(file: Path, card_id: str) -> CardEntry:
     digest = digest_of(read_text(file, CardError, CARD))
     short = store.summary(digest)
     if short is None:
+        from pidemu.card.load import keep, load_file, status_counts
+
         card = load_file(file, card_id)
         if _is_builtin(file):
             keep(card)

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pidemu.card import store
-from pidemu.card.document import CARD, Document, Path_, digest_of
+from pidemu.card.document import CARD, Document, Path_, card_id_of, digest_of, wrong_id
 from pidemu.card.model.base import Evidence, Status, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation, Setting
 from pidemu.card.references import is_active, makes_the_law, named_settings
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
-from pidemu.excerpt import is_hidden, visible
+from pidemu.excerpt import visible
 from pidemu.files.reading import read_text
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ EMULATION = "emulation"
 _REPLACED_WHOLE = ("filter", "windup")
 MOST_COMBINATIONS: Final = 200
 """Combinations of options, all of which are checked."""
-_LONGEST_ID: Final = 200
 DIAL_ORDER = ("multiplier", "gain", "integral", "derivative")
 EQUATION_KEYS = tuple(hyphenated(f.name) for f in fields(Equation))
 
@@ -468,7 +467,7 @@ def load_file(file: Path, card_id: str | None = None, shown: str | None = None) 
         See `card_from` and `pidemu.card.reading.parse`; or its name cannot be an id.
     """
     path = Path(os.path.realpath(file))  # which also says something of links that go round
-    card_id = card_id or f"{path.parent.name}/{path.stem}"
+    card_id = card_id or card_id_of(path)
     wrong = wrong_id(card_id)
     if wrong is not None:
         raise CardError([Problem(shown or str(file), 1, 1, wrong)])
@@ -507,12 +506,3 @@ def keep(card: Card) -> None:
     if card.compiled is None:
         with contextlib.suppress(CardError):
             store.keep(card.digest, *compiled(card))
-
-
-def wrong_id(card_id: str) -> str | None:
-    """Return what is wrong with a card's id, which are the names of its folder and file."""
-    if any(is_hidden(c) for c in card_id):
-        return "the name of the file or folder has characters that cannot be seen; rename it"
-    if len(card_id) > _LONGEST_ID:
-        return f"the names of folder and file have {len(card_id)} characters; at most {_LONGEST_ID} are allowed"
-    return None

@@ -13,6 +13,7 @@ from datetime import date
 from typing import Any, Final, cast
 
 from pidemu.card.model.base import Form, Part, Rule, Status
+from pidemu.part import part_of
 
 _WORDS: Final = {kind.__name__: {word.value: word for word in kind} for kind in (Form, Rule, Status)}
 
@@ -69,7 +70,7 @@ def decoded(data: Any) -> Any:
         return _WORDS[name][said]
     if name == "date":
         return date.fromisoformat(said)
-    return _parts()[name](**{key: decoded(inner) for key, inner in said.items()})
+    return part_of(_parts()[name], {key: decoded(inner) for key, inner in said.items()})
 
 
 def _is_said(part: Part, field: Any) -> bool:

@@ -15,14 +15,16 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pidemu import __version__
-from pidemu.card.model.card_file import CardFile, Equation
-from pidemu.card.plain_data import decoded, encoded
 from pidemu.files import cache
+from pidemu.part import part, part_of
+
+if TYPE_CHECKING:
+    from pidemu.card.model.card_file import CardFile, Equation
 
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
 BUILT_IN: Final = _PACKAGE / "compiled"
@@ -33,7 +35,7 @@ _OTHERS: Final = ("numpy", "pydantic", "yaml")
 """What checking a card rests on besides pidemu and Python."""
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Compiled:
     """A card as plain data.
 
@@ -68,6 +70,8 @@ class Compiled:
         equations : mapping
             Its equation by the choices of all options, for every combination.
         """
+        from pidemu.card.plain_data import encoded
+
         pieces: dict[str, int] = {}
         by_choice: dict[str, dict[str, int]] = {}
         for chosen, equation in equations.items():
@@ -78,14 +82,20 @@ class Compiled:
     @property
     def data(self) -> CardFile:
         """What the card says."""
+        from pidemu.card.plain_data import decoded
+
         found: CardFile = decoded(self.content)
         return found
 
     def equation(self, chosen: tuple[str, ...]) -> Equation:
         """Return the equation for choices of all options."""
-        return Equation(**{name: self._piece(i) for name, i in self.equations[_key(chosen)].items()})
+        from pidemu.card.model.card_file import Equation
+
+        return part_of(Equation, {name: self._piece(i) for name, i in self.equations[_key(chosen)].items()})
 
     def _piece(self, i: int) -> Any:
+        from pidemu.card.plain_data import decoded
+
         if i not in self._made:
             self._made[i] = decoded(self.pieces[i])
         return self._made[i]

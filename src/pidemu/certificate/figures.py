@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from pidemu.analysis.loop_figures import LoopComparison
 from pidemu.certificate.models import EXACT, Band, Certificate, PathComparison
+from pidemu.formatting import number
 from pidemu.units import Role
 
 if TYPE_CHECKING:
@@ -23,15 +24,6 @@ _LOOP_ROWS: Final = (
     ("Mt", "Mt"),
     ("IAE, load step of 1 % [% s]", "iae"),
 )
-
-
-def number(x: float, digits: int = 6) -> str:
-    """Return a number in so many significant digits, as people write it."""
-    if math.isinf(x):
-        return "inf" if x > 0 else "-inf"
-    x = float(f"{x:.{digits}g}") if digits < 6 else x
-    text = f"{x:.{max(digits, 6)}g}"
-    return text if "e" not in text or abs(x) < 1e-4 else f"{x:.0f}" if abs(x) < 1e9 else text
 
 
 def percent(deviation: float) -> str:

@@ -16,8 +16,9 @@ from typing import Final
 
 import numpy as np
 
-from pidemu.certificate.figures import number, unit_of
+from pidemu.certificate.figures import unit_of
 from pidemu.errors import PidemuError
+from pidemu.formatting import number
 from pidemu.law.law import Law
 from pidemu.settings.settings import Settings, Value, limits
 from pidemu.units import Role

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pidemu.card import store
-from pidemu.card.load import Card, keep, load_file, variants
+from pidemu.card.library import is_known_good
 from pidemu.errors import CardError, Problem, capped
+
+if TYPE_CHECKING:
+    from pidemu.card.load import Card
 
 
 def check(card: Card) -> list[Problem]:
@@ -17,7 +21,8 @@ def check(card: Card) -> list[Problem]:
     card : Card
         The card.
     """
-    from pidemu.checks import equations, runs, statements  # NumPy and all that runs a card
+    from pidemu.card.load import variants
+    from pidemu.checks import equations, runs, statements  # with NumPy and all that runs a card
 
     try:
         found = {p for rule in statements.RULES for p in rule(card)}
@@ -39,6 +44,8 @@ def remembered_check(card: Card) -> list[Problem]:
     """
     if store.is_checked(card.digest, card.id):
         return []
+    from pidemu.card.load import keep
+
     found = check(card)
     if not found:
         store.keep_checked(card.digest, card.id)
@@ -59,6 +66,10 @@ def check_file(file: Path, card_id: str | None = None, shown: str | None = None)
         Its name in messages.
     """
     try:
+        if is_known_good(file, card_id):
+            return []
+        from pidemu.card.load import load_file
+
         return remembered_check(load_file(file, card_id, shown))
     except CardError as error:
         return list(error.problems)

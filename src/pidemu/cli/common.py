@@ -14,16 +14,17 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from pidemu.backends.engine_names import ENGINES, Engine
-from pidemu.card.load import Card
-from pidemu.certificate.figures import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.errors import SettingError
 from pidemu.excerpt import printable, printable_json, shortened, visible
 from pidemu.formatting import json_safe
+from pidemu.formatting import number as number  # noqa: PLC0414  # the commands take it from here
 from pidemu.parsing import assignments as assignments  # noqa: PLC0414
 from pidemu.parsing import pair, seconds, step
 from pidemu.settings.ranges import SignalRange, read_range
 
 if TYPE_CHECKING:
+    from pidemu.card.load import Card
+
     _NameType = click.ParamType[str]
     _PairType = click.ParamType[tuple[float, float]]
     _RangeType = click.ParamType[SignalRange]

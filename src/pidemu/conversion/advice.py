@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from pidemu.certificate.figures import number, percent
+from pidemu.certificate.figures import percent
 from pidemu.certificate.noise import noise_change
 from pidemu.conversion.modes import Mode, in_mode
 from pidemu.conversion.spans import range_questions, rescaling, signals_note
+from pidemu.formatting import number
 from pidemu.units import Role, parse_unit
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pidemu.certificate.figures import number, percent
+from pidemu.certificate.figures import percent
 from pidemu.certificate.models import EXACT, LEAST_PHASE, RANK
 from pidemu.conversion.command import set_words
 from pidemu.conversion.match.no_match import NoMatchError
@@ -15,6 +15,7 @@ from pidemu.conversion.match_method import Aim
 from pidemu.conversion.options import Attempt
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
+from pidemu.formatting import number
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pidemu.certificate.figures import number
+from pidemu.formatting import number
 
 DIAL: Final = 1e-6
 """Relative difference up to which a dial is the same: optimisers and other processors end that near, and no dial is set finer."""

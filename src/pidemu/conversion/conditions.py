@@ -11,9 +11,10 @@ from pidemu.card.model.base import Form, Reference, Status
 from pidemu.card.model.card_file import Equation
 from pidemu.card.model.terms import Filter
 from pidemu.card.references import is_active
-from pidemu.certificate.figures import number, percent
+from pidemu.certificate.figures import percent
 from pidemu.conversion.request import DIGITS
 from pidemu.errors import PidemuError
+from pidemu.formatting import number
 from pidemu.settings.settings import Settings
 from pidemu.units import Role
 

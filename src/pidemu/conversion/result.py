@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pidemu.certificate.figures import number
 from pidemu.certificate.models import Certificate, Verdict
 from pidemu.certificate.sentence import sentence
 from pidemu.certificate.setpoint_filter import SetpointFilter, setpoint_filter
@@ -27,7 +26,7 @@ from pidemu.conversion.solver.closed_forms import textbook
 from pidemu.conversion.solver.solver import Solver
 from pidemu.conversion.unstated import Open
 from pidemu.errors import ScanError
-from pidemu.formatting import json_safe
+from pidemu.formatting import json_safe, number
 from pidemu.settings.action import ACTIONS, Action, action_line, action_words, carried_action
 from pidemu.settings.settings import Settings
 

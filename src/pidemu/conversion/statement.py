@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
-from pidemu.certificate.figures import decibels, degrees, emulation_line, kick_line, number, other_units, percent, unit_of
+from pidemu.certificate.figures import decibels, degrees, emulation_line, kick_line, other_units, percent, unit_of
 from pidemu.certificate.models import EXACT
 from pidemu.certificate.unverified import facts, unverified_law, unverified_program
 from pidemu.conversion.conditions import Condition
 from pidemu.conversion.target.computed import is_computed
+from pidemu.formatting import number
 from pidemu.settings.settings import Settings, Value
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.card.model.base import Rule
 from pidemu.card.model.card_file import default_scan
-from pidemu.certificate.figures import number
 from pidemu.controller.bench import Bench
 from pidemu.errors import ScanError
+from pidemu.formatting import number
 from pidemu.settings.action import Action, carried_action, switch_position
 from pidemu.settings.ranges import PERCENT, are_limits
 from pidemu.settings.settings import Settings

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Final
 
-from pidemu.certificate.figures import number
 from pidemu.errors import ScanError
+from pidemu.formatting import number
 from pidemu.settings.range_relation import in_target_units
 from pidemu.settings.ranges import PERCENT, Limits, SignalRange, is_limit
 from pidemu.settings.settings import Settings

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from pidemu.card.model.base import Form
-from pidemu.certificate.figures import number
 from pidemu.explanation.model import DialFacts
+from pidemu.formatting import number
 from pidemu.settings.settings import Settings, Value
 from pidemu.units import Dimension, Role, parse_unit
 

@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from pidemu.certificate.figures import number
 from pidemu.explanation.forms import Times
 from pidemu.explanation.words import four, terms_see
+from pidemu.formatting import number
 
 if TYPE_CHECKING:
     from pidemu.explanation.model import Explanation, Mode

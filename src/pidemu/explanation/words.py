@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from pidemu.algorithm.model import Algorithm
-from pidemu.certificate.figures import number
 from pidemu.explanation.forms import Times
+from pidemu.formatting import number
 from pidemu.settings.settings import Settings
 
 if TYPE_CHECKING:

@@ -7,21 +7,14 @@ Compiled cards are data and lie in a folder of their own within it (`pidemu.card
 
 from __future__ import annotations
 
-import atexit
 import errno
 import functools
 import hashlib
-import logging
 import os
-import shutil
 import stat
-import tempfile
 from pathlib import Path
-from typing import Final
 
 from pidemu import __version__
-
-_LOG: Final = logging.getLogger("pidemu")
 
 
 @functools.cache
@@ -36,6 +29,10 @@ def folder() -> Path:
     OSError
         There is no room for a temporary folder either, or others could exchange it.
     """
+    import atexit
+    import shutil
+    import tempfile
+
     try:
         chosen, path = _chosen()
         fault = _fault(path) or _fault(_made(path))  # nothing is made where others could exchange it
@@ -139,6 +136,8 @@ def put(path: Path, data: bytes) -> Path:
     OSError
         It cannot be written.
     """
+    import tempfile  # which most commands, that only read, do without
+
     handle, unfinished = tempfile.mkstemp(dir=path.parent, suffix=".unfinished")  # nobody else may read or write it
     try:
         with open(handle, "wb") as file:
@@ -153,7 +152,9 @@ def put(path: Path, data: bytes) -> Path:
 @functools.cache
 def warn(message: str) -> None:
     """Say something on standard error that stops nothing, once; a program with a log of its own finds it there."""
-    _LOG.warning("note: %s", message)
+    import logging
+
+    logging.getLogger("pidemu").warning("note: %s", message)
 
 
 def _name(stem: str, suffix: str, data: bytes) -> str:

@@ -6,13 +6,13 @@ import os
 import re
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NoReturn
 
 from pidemu.errors import CardError, PidemuError, Problem
 from pidemu.excerpt import visible
 from pidemu.files.kinds import other_encoding, other_kind
+from pidemu.part import part
 
 _BOM: Final = "\ufeff"
 _CONTROL: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
@@ -34,7 +34,7 @@ _NAMES: Final[Mapping[str, str]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Kind:
     """What a file should be, for its messages.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import pidemu
-from pidemu.certificate.figures import BAND_COLUMNS, band_rows, decibels, degrees, loop_rows, number, percent, rounding_line
+from pidemu.certificate.figures import BAND_COLUMNS, band_rows, decibels, degrees, loop_rows, percent, rounding_line
 from pidemu.certificate.models import EXACT
 from pidemu.conversion.document import card_versions
 from pidemu.conversion.result import Conversion
@@ -32,7 +32,7 @@ from pidemu.conversion.statement import (
 from pidemu.conversion.verify import SHORT
 from pidemu.cutover.plan import TransferPlan
 from pidemu.errors import PidemuError
-from pidemu.formatting import exactly
+from pidemu.formatting import exactly, number
 from pidemu.report.curves import Who, bode, closed_loops, responses
 from pidemu.report.pictures import bode_picture, loops_picture, responses_picture
 from pidemu.settings.action import action_line

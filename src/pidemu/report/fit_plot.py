@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pidemu.certificate.figures import number
+from pidemu.formatting import number
 from pidemu.process.fit.fit import ProcessFit
 from pidemu.report.plots import check_picture, panels, picture_style, save
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pidemu.arrays import Floats
-from pidemu.certificate.figures import number
+from pidemu.formatting import number
 from pidemu.law.rational import Response
 from pidemu.report.curves import Bode, ClosedLoops, StepResponses, Trace, Who
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pidemu.certificate.figures import number
+from pidemu.formatting import number
 from pidemu.process.relay import RelayTest
 from pidemu.report.plots import check_picture, panels, picture_style, save
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
 
 from pidemu.columns.functions import plain
 from pidemu.errors import SettingError
 from pidemu.excerpt import quoted
 from pidemu.formatting import exactly
+from pidemu.part import part
 from pidemu.plausible import ENDS, SIGNAL, SPAN, number, plain_number, shown
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ _ENDS: Final = re.compile(rf"\s*({_NUMBER})\s*(?:,|\.\.|\bto\b)\s*({_NUMBER})(?!
 _SUCH: Final = 'low and high with a unit, such as "0,400 degC"'
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class SignalRange:
     """What 0 and 100 % of a signal are.
 
@@ -165,14 +166,14 @@ def read_range(given: object) -> SignalRange:
     if isinstance(given, SignalRange):
         return given
     found = _from_text(given) if isinstance(given, str) else _from_sequence(given)
-    for part in (found, found.meaning):
-        if part is None:
+    for stated in (found, found.meaning):
+        if stated is None:
             continue
-        if not (math.isfinite(part.low) and math.isfinite(part.high) and part.low < part.high):
-            raise SettingError(f"{part} is not a range; give two finite numbers, low before high")
-        for x, quantity in ((part.low, ENDS), (part.high, ENDS), (part.span, SPAN)):
+        if not (math.isfinite(stated.low) and math.isfinite(stated.high) and stated.low < stated.high):
+            raise SettingError(f"{stated} is not a range; give two finite numbers, low before high")
+        for x, quantity in ((stated.low, ENDS), (stated.high, ENDS), (stated.span, SPAN)):
             if not quantity.has(x):
-                raise SettingError(f"{part}: {quantity.refusal(f'{x:g}')}")
+                raise SettingError(f"{stated}: {quantity.refusal(f'{x:g}')}")
     return found
 
 

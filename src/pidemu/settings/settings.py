@@ -11,6 +11,7 @@ from pidemu.card.load import Card, Variant
 from pidemu.card.model.card_file import Equation, Setting
 from pidemu.card.model.signals import SignalFilter
 from pidemu.errors import ScanError
+from pidemu.part import part
 from pidemu.plausible import INTERVAL, plausible
 from pidemu.settings.ranges import PERCENT, SignalRange, SignalRanges
 from pidemu.units import DEGREES, FULL, Role, Spans, convert_unit, from_canonical, parse_unit, to_canonical
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 _ROLES: Final = {role.value: role for role in Role}
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Value:
     """One dial and its value.
 

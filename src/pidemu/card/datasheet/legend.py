@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from pidemu.card.model.base import Form, Given, Reference, short
@@ -11,12 +11,13 @@ from pidemu.card.model.card_file import Equation
 from pidemu.card.model.signals import ErrorShape, SignalFilter
 from pidemu.card.model.terms import Filter
 from pidemu.errors import UnitError
+from pidemu.part import part
 from pidemu.units import Dimension, parse_unit
 
 _TIMES: Final = (Dimension.TIME, Dimension.TIME_PER_REPEAT)
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class SignalNames:
     """The names of the signals as the terms see them.
 

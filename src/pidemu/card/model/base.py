@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from datetime import date
 from enum import StrEnum
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, cast
 
 from pidemu.card.model.declared import Means, Only, refusal
+from pidemu.part import part
 
 SMALLEST: Final = 1e-40
 LARGEST: Final = 1e40
@@ -153,7 +154,7 @@ class Status(StrEnum):
     ASSUMED = "assumed"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Source(Part):
     """A document or program that the card rests on."""
 
@@ -170,7 +171,7 @@ class Source(Part):
     note: Annotated[Text | None, means("What kind of witness it is, where that matters (a forum post, third-party code).")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Evidence(Part):
     """Where a statement of the card comes from, and how sure it is."""
 

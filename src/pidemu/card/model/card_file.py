@@ -6,7 +6,7 @@ from the modules that this one puts together: those beside it, and the windup sc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any, Literal
 
 from pidemu.card.model.base import Evidence, Form, Name, Number, Part, Reference, SettingName, Size, Source, Text, means
@@ -17,10 +17,11 @@ from pidemu.card.model.operation import Action, Arithmetic, Faults, Output, Scan
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint
 from pidemu.card.model.terms import Cascade, Derivative, Feedforward, Proportional
 from pidemu.card.transfer import Transfer
+from pidemu.part import part
 from pidemu.units import Role, parse_quantity, to_canonical
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Setting(Part):
     """A dial."""
 
@@ -60,7 +61,7 @@ class Setting(Part):
     resolution: Annotated[Size | None, means("Smallest step of the dial, in `unit`.")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Option(Part):
     """Something the vendor lets you choose per loop."""
 
@@ -76,7 +77,7 @@ class Option(Part):
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Quirk(Part):
     """A fact worth knowing that the equation does not show."""
 
@@ -85,7 +86,7 @@ class Quirk(Part):
     at: Annotated[Text | None, means("Place in the source.")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Canonical(Part):
     """Parallel gains and filter time of the feedback path (specs/equations.md, section 3, exact conversion to parallel)."""
 
@@ -95,7 +96,7 @@ class Canonical(Part):
     Tf: Annotated[Number, means("Filter time [s].")] = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Example(Part):
     """Settings and what they amount to; a test runs every one."""
 
@@ -119,7 +120,7 @@ class Example(Part):
     note: Annotated[Text | None, means("What the example shows.")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Equation(Part):
     """The fields of a card that make its equation; options overlay them."""
 
@@ -180,7 +181,7 @@ def default_scan(equation: Equation) -> float:
     return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class CardFile(Equation):
     """One PID algorithm of one product."""
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any, Generic, Literal
 
 from pidemu.card.model.base import GeneralRule, Part, R, means
 from pidemu.card.model.marks import AtRest, Beyond, Names, PerScan
 from pidemu.card.windup import Windup
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class IntegralLimits(Part, Generic[R]):
     """Limits of the integral itself."""
 
@@ -30,7 +30,7 @@ def _deadband(integral: Any) -> str | None:
     return f"integral deadband of {integral.deadband:g}" if integral.deadband else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Integral(Part, Generic[R]):
     """The integral term."""
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 import typing
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from pidemu.card.model.declared import Means
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Names:
     """The field holds a number, or names the setting that holds it.
 
@@ -31,7 +31,7 @@ class Names:
     words: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class Beyond:
     """The linear law leaves the field out (specs/equations.md, section 9).
 
@@ -47,7 +47,7 @@ class Beyond:
     words: Callable[[Any], str | None] | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class AtRest:
     """The field decides about the first scan or a transfer.
 
@@ -60,12 +60,12 @@ class AtRest:
     neutral: Any
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class PerScan:
     """The field says how the law is computed scan by scan, or what happens at limits and transfers: the law is the same without."""
 
 
-@dataclass(frozen=True, slots=True)
+@part(frozen=True, slots=True)
 class LanguageField:
     """A field of the card language, or of an algorithm.
 

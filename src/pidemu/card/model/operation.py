@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any, Generic, Literal
 
 from pidemu.card.model.base import Count, Flag, Name, Number, Part, R, means
 from pidemu.card.model.declared import Only, refusal
 from pidemu.card.model.marks import Beyond, Names
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Faults(Part):
     """What happens with signals that are not numbers and with scan intervals that are none."""
 
@@ -34,7 +34,7 @@ def _arithmetic(arithmetic: Any) -> str | None:
     return f"{arithmetic.type} arithmetic" if arithmetic.type != "float64" else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Arithmetic(Part):
     """How numbers are computed."""
 
@@ -62,7 +62,7 @@ class Arithmetic(Part):
     ] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class ActionExample(Part):
     """One scan that shows which way the output moves, since vendors disagree on the words."""
 
@@ -78,7 +78,7 @@ def _both(names: dict[str, str]) -> dict[str, str]:
     return names
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Action(Part):
     """Control action."""
 
@@ -109,7 +109,7 @@ class Action(Part):
         return -1.0 if self.fixed and self.reverse == "pv - sp" else 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Scan(Part):
     """Scan interval."""
 
@@ -132,7 +132,7 @@ def _step(output: Any) -> str | None:
     return f"output in steps of {output.resolution:g}" if output.resolution else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Output(Part, Generic[R]):
     """Output."""
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any, Generic, Literal
 
 from pidemu.card.model.base import Flag, GeneralRule, Part, R, Rule, Size, means
 from pidemu.card.model.marks import AtRest, Beyond, Names, PerScan
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class SignalFilter(Part, Generic[R]):
     """A first-order filter on a signal before the algorithm, `1/(1 + Tf s)`."""
 
@@ -48,7 +48,7 @@ class SignalFilter(Part, Generic[R]):
         return self.seconds if factor is None else h * (1 - factor) / factor
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Measurement(Part, Generic[R]):
     """What is done to the measurement before the algorithm."""
 
@@ -67,7 +67,7 @@ def _fall(sp: Any) -> str | None:
     return f"setpoint rate limit of {sp.rate_down:g} per s downwards" if other else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Setpoint(Part, Generic[R]):
     """What is done to the setpoint before the algorithm."""
 
@@ -123,7 +123,7 @@ def _shape(error: Any) -> str | None:
     return f"error: {name}{f' of {error.band:g}' if error.shape == 'gap' else ''}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class ErrorShape(Part, Generic[R]):
     """What is done to the error before P and I use it (specs/equations.md, section 8)."""
 

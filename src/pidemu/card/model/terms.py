@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Generic, Literal
 
 from pidemu.card.model.base import Flag, GeneralRule, Part, R, Rule, means
 from pidemu.card.model.marks import AtRest, Names, PerScan
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Proportional(Part, Generic[R]):
     """The proportional term."""
 
@@ -31,7 +31,7 @@ class Proportional(Part, Generic[R]):
     ] = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Filter(Part, Generic[R]):
     """The filter that goes with the derivative."""
 
@@ -70,7 +70,7 @@ class Filter(Part, Generic[R]):
     ] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Derivative(Part, Generic[R]):
     """The derivative term."""
 
@@ -100,7 +100,7 @@ class Derivative(Part, Generic[R]):
     filter: Annotated[Filter[R] | None, means("The filter; none if absent.")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Cascade(Part, Generic[R]):
     """What is different in cascade, with a remote setpoint."""
 
@@ -110,7 +110,7 @@ class Cascade(Part, Generic[R]):
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Feedforward(Part, Generic[R]):
     """A feedforward input."""
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pidemu.card.model.base import Part, means
 from pidemu.card.model.marks import AtRest
 from pidemu.card.transfer.start import Start
+from pidemu.part import part
 
 __all__ = ["STARTS", "Start", "Transfer"]
 
@@ -36,7 +36,7 @@ else:
     StartWord = Literal[tuple(STARTS)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Transfer(Part):
     """What happens when the controller is put into automatic, and in manual before that."""
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pidemu.card.model.base import Flag, Given, R, Reference, means, short
 from pidemu.card.model.marks import Names
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
+from pidemu.part import part
 from pidemu.units import Dimension, parse_unit
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ _ALIKE: Final = 0.01
 """Relative difference of tracking times that counts as none."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupBackCalculation(Scheme[R]):
     """The integral is pulled back by the amount cut off."""
 

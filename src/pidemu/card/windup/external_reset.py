@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Generic, Literal
 
 from pidemu.card.model.base import Given, Part, R, Reference, Rule, means
@@ -12,9 +11,10 @@ from pidemu.card.model.declared import Only
 from pidemu.card.model.marks import Beyond, Names
 from pidemu.card.windup.scheme import NumberSource, Scheme
 from pidemu.numeric import X
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class FastReturn(Part, Generic[R]):
     """An integral that comes back faster from beyond limits of its own."""
 
@@ -37,7 +37,7 @@ def _in_words(windup: Any) -> str | None:
     return f"integral {f.factor:g} times as fast on the way back from below {f.low:g} or above {f.high:g}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupExternalReset(Scheme[R]):
     """Integral by positive feedback."""
 

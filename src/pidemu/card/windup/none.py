@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
 from pidemu.card.windup.scheme import Scheme
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupNone(Scheme[R]):
     """The integral goes on whatever the output does."""
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pidemu.card.model.base import Flag, Given, R, Reference, means
 from pidemu.card.windup.scheme import Scheme
+from pidemu.part import part
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupRecompute(Scheme[R]):
     """At a limit the integral is set to what the limit leaves for it."""
 

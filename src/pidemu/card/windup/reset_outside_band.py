@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pidemu.card.model.base import Given, R, Reference, means
 from pidemu.card.windup.scheme import Scheme
+from pidemu.part import part
 
 if TYPE_CHECKING:
     from pidemu.card.model.card_file import Equation
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class WindupResetOutsideBand(Scheme[R]):
     """The integral is cleared while the measurement is outside the proportional band."""
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, Self, TypeVar, cast
 
 from pidemu.card.model.base import GENERAL_RULES, Given, Part, R, Reference, Rule
 from pidemu.numeric import Real, X
+from pidemu.part import part
 
 if TYPE_CHECKING:
     from pidemu.card.model.card_file import Equation
@@ -37,7 +37,7 @@ class NumberSource(Protocol[N_co]):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@part(frozen=True, slots=True, kw_only=True)
 class Scheme(Part, Generic[R]):
     """A windup scheme: what happens to the integral at an output limit (specs/equations.md, section 5).
 
