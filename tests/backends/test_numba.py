@@ -167,7 +167,7 @@ sys.stdout.buffer.write(pickle.dumps(Bait()))
 def test_a_damaged_or_foreign_file_is_never_unpickled_and_is_compiled_anew(damage: str, tmp_path: Path) -> None:
     code, bait = tmp_path / "code", tmp_path / "bait"
     first = said(started(code))
-    (path,) = (code / pidemu.__version__).iterdir()
+    (path,) = (code / pidemu.__version__).glob("*.numba")
     sound = path.read_bytes()
     middle = len(sound) // 2
     turned = sound[:middle] + bytes([sound[middle] ^ 1]) + sound[middle + 1 :]
