@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from pidemu.cli.common import OutputArgument, echo, heading, json_option, print_json, table, wrapped
-from pidemu.cli.outputs import check_outputs, inputs
+from pidemu.cli.inputs import inputs
 from pidemu.errors import ListError
 from pidemu.excerpt import printable_json, visible
+from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import write_table
 from pidemu.files.writing import beside
 
