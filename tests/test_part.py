@@ -98,3 +98,21 @@ def test_it_can_be_copied_and_sent_to_another_process() -> None:
 def test_a_part_of_values_is_the_part_and_what_is_not_given_is_none() -> None:
     assert part_of(Late, {"a": 1, "b": "b", "c": []}) == Late(a=1)
     assert part_of(Late, {"a": 1}).b is None
+
+
+@part(frozen=True, slots=True)
+class WithItsOwn:
+    x: float
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, WithItsOwn)
+
+    def __hash__(self) -> int:
+        return 7
+
+    def __repr__(self) -> str:
+        return "own"
+
+
+def test_methods_of_its_own_stay() -> None:
+    assert (WithItsOwn(1.0) == WithItsOwn(2.0), hash(WithItsOwn(1.0)), repr(WithItsOwn(1.0))) == (True, 7, "own")
