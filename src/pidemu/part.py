@@ -27,7 +27,8 @@ else:
         def made(cls: type) -> type:
             kind = dataclasses.dataclass(init=False, repr=False, eq=False, slots=True, kw_only=kw_only)(cls)
             for name, method in _FIRST.items():
-                setattr(kind, name, method)
+                if not _is_own(kind, name):
+                    setattr(kind, name, method)
             kind.__setattr__ = kind.__delattr__ = _refuse
             kind.__getstate__, kind.__setstate__ = _state, _set_state
             return kind
@@ -76,8 +77,13 @@ def _complete(kind: type[Any], asked: str) -> None:
         body["__post_init__"] = kind.__post_init__
     made: type[Any] = dataclasses.dataclass(frozen=True, **_ONLY[asked])(type(kind.__name__, (), body))
     for name, argument in _LATER.items():
-        if argument == asked:
+        if argument == asked and kind.__dict__[name] is _FIRST[name]:
             setattr(kind, name, made.__dict__[name])
+
+
+def _is_own(kind: type[Any], name: str) -> bool:
+    """Tell whether a class has a method of its own, which stays; that Python gives no hash to one with equality is none."""
+    return name in kind.__dict__ and not (kind.__dict__[name] is None and "__eq__" in kind.__dict__)
 
 
 def _refuse(self: Any, name: str, *_: Any) -> NoReturn:

@@ -72,6 +72,7 @@ def test_check_and_the_list_of_cards_go_on_with_a_wrong_card(wrong: Path) -> Non
 
 
 def test_a_card_is_checked_once_as_long_as_its_file_does_not_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PIDEMU_CACHE", str(tmp_path / "cache"))
     seen: list[str] = []
     check = checks.check
 

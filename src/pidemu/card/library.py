@@ -210,7 +210,7 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
     return CardError(problems) if problems else card
 
 
-def is_known_good(file: Path, card_id: str | None = None) -> bool:
+def is_known_good(file: Path, card_id: str | None = None, shown: str | None = None) -> bool:
     """Tell whether a check of this very card by this very pidemu had nothing to say.
 
     Raises
@@ -219,7 +219,7 @@ def is_known_good(file: Path, card_id: str | None = None) -> bool:
         The file cannot be read, or is no text.
     """
     path = Path(os.path.realpath(file))
-    return store.is_checked(digest_of(read_text(path, CardError, CARD, shown=str(file))), card_id or card_id_of(path))
+    return store.is_checked(digest_of(read_text(path, CardError, CARD, shown=shown or str(file))), card_id or card_id_of(path))
 
 
 def _is_builtin(file: Path) -> bool:

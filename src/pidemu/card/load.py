@@ -231,14 +231,14 @@ class Card:
         What the card says.
     document : Document
         The file, with places.
-    compiled : Compiled or None
+    compiled : CompiledCard or None
         Its plain data, where it was not read from its file.
     """
 
     id: str
     data: CardFile
     document: Document = field(repr=False)
-    compiled: store.Compiled | None = field(default=None, repr=False, compare=False)
+    compiled: store.CompiledCard | None = field(default=None, repr=False, compare=False)
     _variants: dict[tuple[str, ...], Variant] = field(default_factory=dict, repr=False, compare=False)
 
     def __hash__(self) -> int:
@@ -488,7 +488,7 @@ def status_counts(card: Card) -> dict[str, int]:
     return {s.value: found[s] for s in Status}
 
 
-def compiled(card: Card) -> tuple[store.Compiled, dict[str, Any]]:
+def compiled(card: Card) -> tuple[store.CompiledCard, dict[str, Any]]:
     """Return a card as plain data, and what it says of itself in short.
 
     Raises
@@ -498,7 +498,7 @@ def compiled(card: Card) -> tuple[store.Compiled, dict[str, Any]]:
     """
     equations = {tuple(variant.chosen.values()): variant.equation for variant in variants(card)}
     short = {"title": card.title, "status": status_counts(card)}
-    return store.Compiled.of(card.document.value, card.data, equations), short
+    return store.CompiledCard.of(card.document.value, card.data, equations), short
 
 
 def keep(card: Card) -> None:

@@ -36,7 +36,7 @@ _OTHERS: Final = ("numpy", "pydantic", "yaml")
 
 
 @part(frozen=True, slots=True)
-class Compiled:
+class CompiledCard:
     """A card as plain data.
 
     Attributes
@@ -58,7 +58,7 @@ class Compiled:
     _made: dict[int, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def of(cls, value: Any, data: CardFile, equations: Mapping[tuple[str, ...], Equation]) -> Compiled:
+    def of(cls, value: Any, data: CardFile, equations: Mapping[tuple[str, ...], Equation]) -> CompiledCard:
         """Compile a card.
 
         Parameters
@@ -101,13 +101,13 @@ class Compiled:
         return self._made[i]
 
 
-def find(digest: str) -> Compiled | None:
+def find(digest: str) -> CompiledCard | None:
     """Return the compiled card of a text, by the text's digest; ``None`` where there is none."""
     lines = _lines(digest)
     if lines is None:
         return None
     body = json.loads(lines[1])
-    return Compiled(body["value"], body["content"], body["pieces"], body["equations"])
+    return CompiledCard(body["value"], body["content"], body["pieces"], body["equations"])
 
 
 def summary(digest: str) -> dict[str, Any] | None:
@@ -116,14 +116,14 @@ def summary(digest: str) -> dict[str, Any] | None:
     return None if lines is None else json.loads(lines[0])
 
 
-def keep(digest: str, compiled: Compiled, short: Mapping[str, Any]) -> None:
+def keep(digest: str, compiled: CompiledCard, short: Mapping[str, Any]) -> None:
     """Keep a compiled card in the cache folder, where that can be written.
 
     Parameters
     ----------
     digest : str
         The digest of the card's text.
-    compiled : Compiled
+    compiled : CompiledCard
         The card.
     short : mapping
         What it says of itself in short, plain values.
@@ -131,7 +131,7 @@ def keep(digest: str, compiled: Compiled, short: Mapping[str, Any]) -> None:
     _put(_name(digest), written(compiled, short))
 
 
-def written(compiled: Compiled, short: Mapping[str, Any]) -> bytes:
+def written(compiled: CompiledCard, short: Mapping[str, Any]) -> bytes:
     """Return a compiled card as it stands in a file: a digest of the rest, what it says in short, the rest."""
     body = {"value": compiled.value, "content": compiled.content, "pieces": compiled.pieces, "equations": compiled.equations}
     rest = "\n".join(json.dumps(part, separators=(",", ":")) for part in (dict(short), body)).encode()
@@ -192,7 +192,7 @@ def _name(digest: str) -> str:
 
 
 def _name_of_check(digest: str, card_id: str) -> str:
-    return f"checked-{hashlib.sha256(f'{digest} {card_id} {_code()}'.encode()).hexdigest()}"
+    return f"checked-{hashlib.sha256(f'{digest} {card_id} {_code()}'.encode(errors='surrogatepass')).hexdigest()}"
 
 
 @functools.cache

@@ -66,7 +66,7 @@ def check_file(file: Path, card_id: str | None = None, shown: str | None = None)
         Its name in messages.
     """
     try:
-        if is_known_good(file, card_id):
+        if is_known_good(file, card_id, shown):
             return []
         from pidemu.card.load import load_file
 
