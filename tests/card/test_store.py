@@ -89,7 +89,7 @@ def test_a_compiled_card_is_the_card(name: str, cache: Path) -> None:
     for old, new in zip(variants(card), variants(again), strict=True):
         assert (new.chosen, new.equation, new.raw) == (old.chosen, old.equation, old.raw)
         assert repr(new.equation) == repr(old.equation)
-        assert list(map(repr, new.statements)) == list(map(repr, old.statements()))
+        assert list(map(repr, new.statements)) == list(map(repr, old.statements))
         assert list(map(str, new.assumptions())) == list(map(str, old.assumptions()))
 
 
