@@ -57,6 +57,7 @@ def test_the_archives_hold_every_card(archives: tuple[Path, Path]) -> None:
     packed = set(zipfile.ZipFile(wheel).namelist())
     assert sorted(n.removeprefix("pidemu/vendors/") for n in packed if n.startswith("pidemu/vendors/")) == CARDS
     assert {"pidemu/py.typed", "pidemu/__main__.py"} <= packed
+    assert len([n for n in packed if n.startswith("pidemu/compiled/card-")]) == len(CARDS)
     assert {"pidemu"} == {n.split("/")[0] for n in packed if ".dist-info/" not in n}
     with tarfile.open(sdist) as archive:
         names = {n.split("/", 1)[1] for n in archive.getnames() if "/" in n}
@@ -76,6 +77,15 @@ def test_what_developers_run_is_in_the_source_archive_and_not_in_the_wheel(archi
     assert [n for n in packed if "tools" in n.split("/") or "tests" in n.split("/")] == []
     assert [n for n, text in packed.items() if n.endswith(".py") and b"\nif __name__ ==" in text] == ["pidemu/__main__.py"]
 
+
+COMPILED = """
+import os, pidemu, sys
+os.environ["PIDEMU_CACHE"] = os.devnull
+for card in pidemu.cards():
+    was_read = pidemu.load_card(card).compiled is None or {"yaml", "pydantic"} & set(sys.modules)
+    print(card, "read" if was_read else "compiled")
+"""
+"""Whether all cards come compiled."""
 
 EVERY_MODULE = """
 import importlib, pkgutil, pidemu
@@ -103,6 +113,8 @@ def test_the_installed_wheel_converts_and_checks_far_from_the_repository(archive
     ).to_dict()
     assert {k: here[k] for k in ("from", "to", "verdict")} == {k: found[k] for k in ("from", "to", "verdict")}
     assert _run([scripts / "pidemu", "check"], elsewhere).stdout == f"{len(CARDS)} cards, 0 problems\n"
+    listed = _run([scripts / "python", "-c", COMPILED], elsewhere).stdout.splitlines()
+    assert listed == [f"{card} compiled" for card in pidemu.cards()]
     assert _run([scripts / "pidemu", "--version"], elsewhere).stdout == f"pidemu {pidemu.__version__}\n"
     there = {f.relative_to(ROOT / "src").as_posix() for f in (ROOT / "src").rglob("*.py")} - {
         "pidemu/__init__.py",

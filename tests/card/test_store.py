@@ -38,7 +38,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache folder that is empty, and a process that has loaded no card yet."""
     monkeypatch.setenv("PIDEMU_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(library, "_loaded", {})
-    return tmp_path / "cache" / pidemu.__version__ / "cards"
+    return tmp_path / "cache" / "cards" / pidemu.__version__
 
 
 @pytest.fixture

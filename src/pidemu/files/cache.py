@@ -34,7 +34,8 @@ def folder() -> Path:
     import tempfile
 
     try:
-        chosen, path = _chosen()
+        chosen, place = _chosen()
+        path = place / __version__
         fault = _fault(path) or _fault(_made(path))  # nothing is made where others could exchange it
         if fault:
             warn(f"{chosen}: not used for compiled code, as {fault}; name a folder of your own in PIDEMU_CACHE")
@@ -53,7 +54,7 @@ def folder() -> Path:
 
 
 def private(name: str, *, make: bool = False) -> Path | None:
-    """Return a folder of this name within the cache folder, for data; ``None`` where there is none, or others can write to it.
+    """Return a folder of this name for data, within the cache folder; ``None`` where there is none, or others can write to it.
 
     Unlike `folder` it says nothing and has no substitute: what would be kept there is computed again.
 
@@ -65,8 +66,8 @@ def private(name: str, *, make: bool = False) -> Path | None:
         Whether it is made where it is not there.
     """
     try:
-        path = _chosen()[1] / name
-        if _fault(path) or (make and _fault(_made(path))):
+        path = _chosen()[1] / name / __version__
+        if _fault(path, own=3) or (make and _fault(_made(path), own=3)):
             return None
     except (OSError, RuntimeError, ValueError):  # see `folder`
         return None
@@ -74,13 +75,13 @@ def private(name: str, *, make: bool = False) -> Path | None:
 
 
 def _chosen() -> tuple[str, Path]:
-    """Return the folder that the user or the system names, and the one in it for this version of pidemu."""
+    """Return the cache folder as the user or the system names it, and where it is."""
     chosen = os.environ.get("PIDEMU_CACHE")
     if not chosen:
         import platformdirs
 
         chosen = platformdirs.user_cache_dir("pidemu", appauthor=False)
-    return chosen, Path(os.path.realpath(Path(chosen).expanduser())) / __version__
+    return chosen, Path(os.path.realpath(Path(chosen).expanduser()))
 
 
 def load(stem: str, suffix: str) -> tuple[Path, bytes] | None:
