@@ -12,7 +12,7 @@ RowClass = Literal["converted", "decision", "error", "skipped"]
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class RowCode:
     """A code of a finding.
 
     Attributes
@@ -39,62 +39,63 @@ class Code:
 
 
 _CODES: Final = (
-    Code("E-tag", "The loop has no tag, so that nobody can say which one it is.", 3),
-    Code("E-card", "The system is not known: no card, and no word of the mapping, has this name.", 3),
-    Code("E-missing", "A gain or an integral setting is blank or not there.", 3),
-    Code("E-number", "A cell that should hold a number holds something else, or a number with a mark such as ~2 or 1.5?.", 3),
-    Code("E-date", "A cell that should hold a number holds a date, which spreadsheets make of fractions and part numbers.", 3),
-    Code("E-unit", "A unit is of another kind than the setting, or unknown.", 3),
-    Code("E-negative", "A setting is negative, and the card's range is not.", 3),
-    Code("E-range", "A range whose low end is not below its high end, or a value outside the card's range.", 3),
-    Code("E-bits", "The named bits of a Logix PID tag contradict its control word CTL.", 3),
-    Code("E-program", "pidemu failed on this loop, which is a fault of its own: report it with the line of the list.", 3),
-    Code("D-refused", "The target cannot do what the source does; the nearest settings and their cost are stated.", 1,
+    RowCode("E-tag", "The loop has no tag, so that nobody can say which one it is.", 3),
+    RowCode("E-card", "The system is not known: no card, and no word of the mapping, has this name.", 3),
+    RowCode("E-missing", "A gain or an integral setting is blank or not there.", 3),
+    RowCode("E-number", "A cell that should hold a number holds something else, or a number with a mark such as ~2 or 1.5?.", 3),
+    RowCode("E-date", "A cell that should hold a number holds a date, which spreadsheets make of fractions and part numbers.", 3),
+    RowCode("E-unit", "A unit is of another kind than the setting, or unknown.", 3),
+    RowCode("E-negative", "A setting is negative, and the card's range is not.", 3),
+    RowCode("E-range", "A range whose low end is not below its high end, or a value outside the card's range.", 3),
+    RowCode("E-bits", "The named bits of a Logix PID tag contradict its control word CTL.", 3),
+    RowCode("E-program", "pidemu failed on this loop, which is a fault of its own: report it with the line of the list.", 3),
+    RowCode("D-refused", "The target cannot do what the source does; the nearest settings and their cost are stated.", 1,
     "nearest; skip"),
-    Code("D-duplicate", "Another line has the same tag and other contents.", 2, "the line that counts, such as Sheet1:12, "
+    RowCode("D-duplicate", "Another line has the same tag and other contents.", 2, "the line that counts, such as Sheet1:12, "
     "or the file; skip"),
-    Code("D-unit", "A unit can be read in two ways, or cell and unit column contradict each other.",
+    RowCode("D-unit", "A unit can be read in two ways, or cell and unit column contradict each other.",
          4, "the unit, such as min/repeat"),
-    Code("D-form", "The form is not stated and it matters, because derivative is used.", 4, "the choice, such as ideal"),
-    Code("D-equation", "The equation is not stated, and the units of the settings hang on it.",
+    RowCode("D-form", "The form is not stated and it matters, because derivative is used.", 4, "the choice, such as ideal"),
+    RowCode("D-equation", "The equation is not stated, and the units of the settings hang on it.",
          4, "the choice, such as independent"),
-    Code("D-structure", "It is not stated which terms see the setpoint, though other loops of this system state it.", 4,
+    RowCode("D-structure", "It is not stated which terms see the setpoint, though other loops of this system state it.", 4,
     "the choice"),
-    Code("D-mode", "The structure follows the mode, and the mode is not stated or is manual.", 4, "auto; cascade"),
-    Code("D-action", "The control action is blank or a word that is not known.", 5, "reverse; direct"),
-    Code("D-range", "A signal range is needed and not there.", 6, "the range, such as 0..45 t/h"),
-    Code("D-rerange", "There is a new range, and not whether it is the same signal on another scale or another range.", 6,
+    RowCode("D-mode", "The structure follows the mode, and the mode is not stated or is manual.", 4, "auto; cascade"),
+    RowCode("D-action", "The control action is blank or a word that is not known.", 5, "reverse; direct"),
+    RowCode("D-range", "A signal range is needed and not there.", 6, "the range, such as 0..45 t/h"),
+    RowCode("D-rerange", "There is a new range, and not whether it is the same signal on another scale or another range.", 6,
          "same signal; other range"),
-    Code("D-update", "The update time that the block computes with is not the interval at which it is executed.", 6,
+    RowCode("D-update", "The update time that the block computes with is not the interval at which it is executed.", 6,
          "scan (the block computes with the interval); real (it computes with the update time, and that shall be made up for)"),
-    Code("D-zero-gain", "The gain is zero while another setting is not.", 6, "convert; skip"),
-    Code("D-unused", "The loop is not used: all settings are zero, nothing executes it, or a remark says so.", 6, "convert; skip"),
-    Code("D-default", "The settings are those the block is delivered with: it was never tuned.", 6, "convert; skip"),
-    Code("D-no-integral", "There is no integral action: the output at SP = PV, the bias, has to be chosen.",
+    RowCode("D-zero-gain", "The gain is zero while another setting is not.", 6, "convert; skip"),
+    RowCode("D-unused", "The loop is not used: all settings are zero, nothing executes it, or a remark says so.",
+         6, "convert; skip"),
+    RowCode("D-default", "The settings are those the block is delivered with: it was never tuned.", 6, "convert; skip"),
+    RowCode("D-no-integral", "There is no integral action: the output at SP = PV, the bias, has to be chosen.",
          6, "the bias in %, such as 50"),
-    Code("D-nonlinear", "The loop uses something beyond PID (gap, error squared, feedforward, ratio, split range, ...).", 6,
+    RowCode("D-nonlinear", "The loop uses something beyond PID (gap, error squared, feedforward, ratio, split range, ...).", 6,
          "convert (without it); skip"),
-    Code("D-filter", "The source filters its measurement, and the target has nowhere to put the filter.", 6,
+    RowCode("D-filter", "The source filters its measurement, and the target has nowhere to put the filter.", 6,
          "in front (a filter outside the block); leave out"),
-    Code("F-approx", "The conversion is not exact, or not at the scan intervals of both; how far it is off is stated.", 7),
-    Code("F-structure", "Another share of the terms sees the setpoint: a setpoint step kicks the output otherwise.", 8),
-    Code("F-limits", "The output limits are not 0 to 100 %; set them on the target, and the anti-windup limits, in its units.", 9),
-    Code("F-unit-assumed", "No unit is stated: the card's own, or the mapping's, was taken.", 10),
-    Code("F-unit-other", "The unit that is stated is not the card's own, so the number was converted.", 10),
-    Code("F-td-ti", "The derivative time is longer than the integral time.", 10),
-    Code("F-series-limit", "The integral time is less than four derivative times, which no series form can do exactly.", 10),
-    Code("F-scan-slow", "The loop is executed less than ten times in its integral time.", 10),
-    Code("F-filter-long", "The filter of the measurement is longer than the derivative time.", 10),
-    Code("F-rerange", "The measurement gets another range, so the gain was multiplied by new over old span.", 10),
-    Code("F-rescaled", "The measurement gets another scale of the same signal; the gain stays.", 10),
-    Code("F-manual", "The loop was in manual: nobody knows whether these settings work.", 10),
-    Code("F-hidden-row", "The line, or a column that was read, is hidden in the spreadsheet.", 10),
-    Code("F-cascade", "The loop is in cascade, and its partner is not named in the list.", 10),
-    Code("F-rounding", "Rounding moves a setting by more than 0.1 %.", 10),
-    Code("F-repeat", "The loop stands in the list more than once, with the same contents; it counts once.", 10),
-    Code("F-interval", "The interval at which the block is executed cannot be told from the file.", 10),
-    Code("F-decided", "A person decided; the name and the reason stand with the loop.", 10),
-    Code("F-lowered", "The plant's rules let pass what would stop the loop.", 10),
+    RowCode("F-approx", "The conversion is not exact, or not at the scan intervals of both; how far it is off is stated.", 7),
+    RowCode("F-structure", "Another share of the terms sees the setpoint: a setpoint step kicks the output otherwise.", 8),
+    RowCode("F-limits", "The output limits are not 0 to 100 %; set them and the anti-windup limits on the target, in its units.", 9),
+    RowCode("F-unit-assumed", "No unit is stated: the card's own, or the mapping's, was taken.", 10),
+    RowCode("F-unit-other", "The unit that is stated is not the card's own, so the number was converted.", 10),
+    RowCode("F-td-ti", "The derivative time is longer than the integral time.", 10),
+    RowCode("F-series-limit", "The integral time is less than four derivative times, which no series form can do exactly.", 10),
+    RowCode("F-scan-slow", "The loop is executed less than ten times in its integral time.", 10),
+    RowCode("F-filter-long", "The filter of the measurement is longer than the derivative time.", 10),
+    RowCode("F-rerange", "The measurement gets another range, so the gain was multiplied by new over old span.", 10),
+    RowCode("F-rescaled", "The measurement gets another scale of the same signal; the gain stays.", 10),
+    RowCode("F-manual", "The loop was in manual: nobody knows whether these settings work.", 10),
+    RowCode("F-hidden-row", "The line, or a column that was read, is hidden in the spreadsheet.", 10),
+    RowCode("F-cascade", "The loop is in cascade, and its partner is not named in the list.", 10),
+    RowCode("F-rounding", "Rounding moves a setting by more than 0.1 %.", 10),
+    RowCode("F-repeat", "The loop stands in the list more than once, with the same contents; it counts once.", 10),
+    RowCode("F-interval", "The interval at which the block is executed cannot be told from the file.", 10),
+    RowCode("F-decided", "A person decided; the name and the reason stand with the loop.", 10),
+    RowCode("F-lowered", "The plant's rules let pass what would stop the loop.", 10),
 )  # fmt: skip
 CODES: Final = {code.name: code for code in _CODES}
 """Every code by its name."""
@@ -109,7 +110,7 @@ STOP_WORDS: Final = {
 """What plants call the decisions."""
 
 
-def code_named(word: str) -> Code:
+def code_named(word: str) -> RowCode:
     """Return the code with a name, or with a plant's word for it.
 
     Raises

@@ -15,7 +15,7 @@ from pidemu.plant.converting import LoopConversion, as_ranged, convert_loop
 from pidemu.plant.decisions import SKIP, Decisions, note_decision, pass_over, read_decisions
 from pidemu.plant.duplicates import note_duplicates
 from pidemu.plant.lines import SkippedLine
-from pidemu.plant.loop_list import Again, LoopList, read_lists
+from pidemu.plant.loop_list import Again, PlantList, read_lists
 from pidemu.plant.mapping import PlantWords, read_mapping
 from pidemu.plant.outcomes import with_outcomes
 from pidemu.plant.reading import ask_structures
@@ -134,7 +134,7 @@ def retrofit(
 
 
 def convert_lists(
-    listed: LoopList,
+    listed: PlantList,
     rules: PlantRules,
     words: PlantWords,
     decisions: Decisions,
@@ -144,7 +144,7 @@ def convert_lists(
 
     Parameters
     ----------
-    listed : LoopList
+    listed : PlantList
         The loops.
     rules, words, decisions
         As for `retrofit`.
@@ -193,7 +193,7 @@ def attempt(reading: LoopReading, rules: PlantRules, decisions: Decisions) -> Lo
         return None
 
 
-def _summary(rows: Sequence[RetrofitRow], listed: LoopList) -> RetrofitSummary:
+def _summary(rows: Sequence[RetrofitRow], listed: PlantList) -> RetrofitSummary:
     counts = dict.fromkeys(_CLASSES, 0)
     cards: dict[str, Counter[str]] = defaultdict(Counter)
     areas: dict[str, Counter[str]] = defaultdict(Counter)

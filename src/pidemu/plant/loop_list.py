@@ -21,7 +21,7 @@ ReadLoop = tuple[LoopReading, Again]
 
 
 @dataclass
-class LoopList:
+class PlantList:
     """All loops of a job, read and not yet converted.
 
     Attributes
@@ -45,7 +45,7 @@ class LoopList:
     files: dict[str, str] = field(default_factory=dict)
 
 
-def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Decisions) -> LoopList:
+def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Decisions) -> PlantList:
     """Read the loops of files.
 
     Parameters
@@ -62,7 +62,7 @@ def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Deci
     ListError
         No line of a file is a header of loops.
     """
-    found = LoopList()
+    found = PlantList()
     sources = list(sources)
     for source in sources:
         found.files[source.file] = source.digest
@@ -87,7 +87,7 @@ def read_lists(sources: Iterable[LoopSource], words: PlantWords, decisions: Deci
     return found
 
 
-def _layouts(source: LoopSource, words: PlantWords, found: LoopList) -> Iterator[ListLayout]:
+def _layouts(source: LoopSource, words: PlantWords, found: PlantList) -> Iterator[ListLayout]:
     for sheet in source.sheets:
         found.notes += [f"{sheet.shown}: {note}" for note in sheet.notes]
         if not words.is_read(sheet.name, sheet.hidden):

@@ -7,7 +7,7 @@ from typing import Final
 
 from pidemu.card.load import Card, match_name
 from pidemu.card.model.card_file import Equation
-from pidemu.plant.rules import FREE, MATCH_SOURCE, LoopRules, option_text
+from pidemu.plant.rules import AS_NEEDED, MATCH_SOURCE, LoopRules, option_text
 from pidemu.settings.settings import Settings
 
 _TERMS: Final = ("proportional", "integral", "derivative")
@@ -20,7 +20,7 @@ def wanted_options(source: Settings, target: Card, ruled: LoopRules, mode: str |
     for name, value in ruled.options.items():
         option = match_name(name, target.data.options)
         text = option_text(value)
-        if text == FREE or (option and text == MATCH_SOURCE):
+        if text == AS_NEEDED or (option and text == MATCH_SOURCE):
             continue
         if option:
             options[option] = text

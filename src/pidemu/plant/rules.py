@@ -24,7 +24,7 @@ from pidemu.plant.mapping import read_yaml
 
 _KIND: Final = Kind("a rule file", "a rule file is YAML text that states target: and options:", limit=2**20)
 MATCH_SOURCE: Final = "match-source"
-FREE: Final = "free"
+AS_NEEDED: Final = "free"
 """A dial that the conversion may set as it needs it."""
 EXACT_ELSE: Final = "exact-else-low-frequency"
 PvFilter = Literal["carry", "in front", "leave out"]
@@ -209,7 +209,7 @@ def _check_options(card: Card, w: RuleFile, second: bool, shown: str) -> None:
                 known = [*card.options, *card.all_settings()]
                 raise ListError(f"{shown}: {place}: {card.id} has no option '{name}'{suggest(name, known)}")
             choices = next((c for o, c in card.options.items() if o.casefold() == name.casefold()), None)
-            if choices is not None and _written(value) not in (*choices, MATCH_SOURCE, FREE):
+            if choices is not None and _written(value) not in (*choices, MATCH_SOURCE, AS_NEEDED):
                 raise ListError(f"{shown}: {place}: {name} is '{value}'; it is one of {', '.join((*choices, MATCH_SOURCE))}")
     try:
         if w.match not in (None, EXACT_ELSE):

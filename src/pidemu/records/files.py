@@ -204,7 +204,7 @@ class _Columns:
     def _column(self, name: str, at: int, cells: Sequence[str], numbers: Sequence[int]) -> Floats:
         """Return a column's numbers: all at once where they are plain, else cell by cell."""
         found = None if name in ("auto", "hold") or isinstance(self._first, datetime) else plain_numbers(cells)
-        if found is not None:
+        if found is not None and (name not in ("time", "interval") or all(map(TIME.has, set(found.tolist())))):
             if name == "time" and self._first is None:
                 self._first = float(found[0])
             return found
