@@ -90,8 +90,8 @@ def plain_numbers(cells: Sequence[str]) -> Floats | None:
 
     Examples
     --------
-    >>> plain_numbers(["1.5", "-2e3"]), plain_numbers(["1.5", "nan"]), plain_numbers(["1e-999"])
-    (array([    1.5, -2000. ]), None, None)
+    >>> plain_numbers(["1.5", "-2e3"]).tolist(), plain_numbers(["1.5", "nan"]), plain_numbers(["1e-999"])
+    ([1.5, -2000.0], None, None)
     """
     if "".join(cells).strip(_PLAIN):
         return None

@@ -79,7 +79,7 @@ _CODES: Final = (
          "in front (a filter outside the block); leave out"),
     RowCode("F-approx", "The conversion is not exact, or not at the scan intervals of both; how far it is off is stated.", 7),
     RowCode("F-structure", "Another share of the terms sees the setpoint: a setpoint step kicks the output otherwise.", 8),
-    RowCode("F-limits", "The output limits are not 0 to 100 %; set them and the anti-windup limits on the target, in its units.", 9),
+    RowCode("F-limits", "The output limits are not 0 to 100 %; set them and anti-windup limits on the target, in its units.", 9),
     RowCode("F-unit-assumed", "No unit is stated: the card's own, or the mapping's, was taken.", 10),
     RowCode("F-unit-other", "The unit that is stated is not the card's own, so the number was converted.", 10),
     RowCode("F-td-ti", "The derivative time is longer than the integral time.", 10),
