@@ -121,7 +121,7 @@ def test_an_error_of_pidemu_is_an_answer(tmp_path: Path) -> None:
 
 
 def test_a_crash_in_pidemu_is_found_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pidemu.records.files._times", lambda _cells: 1 / 0)
+    monkeypatch.setattr("pidemu.records.files.plain_numbers", lambda _cells: 1 / 0)
     found = outcome(RUN, tmp_path, "time,sp,pv\n0,1,2\n1,1,2\n")
     assert found is not None
     assert "ZeroDivisionError" == found.what

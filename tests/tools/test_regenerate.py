@@ -43,7 +43,7 @@ def edit(file: Path, old: str, new: str) -> str:
 @pytest.mark.usefixtures("repository")
 def test_what_is_current_is_not_written_again() -> None:
     found = regenerate()
-    assert (found.exit_code, found.output) == (0, "10 generated files, 0 written\n")
+    assert (found.exit_code, found.output) == (0, "12 generated files, 0 written\n")
 
 
 def test_a_check_names_each_stale_file_with_its_first_difference_and_writes_nothing(repository: Path) -> None:
@@ -59,7 +59,7 @@ def test_a_check_names_each_stale_file_with_its_first_difference_and_writes_noth
         "docs/emulation.md: line 1",
         "  there: # Emulations",
         "  today: # How the emulations were verified",
-        "10 generated files, 2 stale",
+        "12 generated files, 2 stale",
     ]
     assert before == {file: file.read_bytes() for file in repository.rglob("*.*") if file.is_file()}
 
@@ -68,7 +68,7 @@ def test_a_stale_file_is_written_and_what_is_not_generated_in_it_stays(repositor
     language = repository / "specs" / "card-language.md"
     current = edit(language, "### Windup Clamp", "### Clamp")
     edit(language, "# The card language, version 1", "# In my own words")
-    assert regenerate().output.splitlines()[-1] == "10 generated files, 1 written"
+    assert regenerate().output.splitlines()[-1] == "12 generated files, 1 written"
     assert language.read_text(encoding="utf-8") == current.replace("# The card language, version 1", "# In my own words")
 
 
@@ -87,7 +87,7 @@ def test_a_name_that_is_not_generated_is_refused_with_those_that_are() -> None:
 @pytest.mark.usefixtures("repository")
 def test_cards_of_the_user_s_own_do_not_enter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PIDEMU_VENDORS", str(written(tmp_path / "own", VALID).parents[1]))
-    assert regenerate("--check").output == "10 generated files, 0 stale\n"
+    assert regenerate("--check").output == "12 generated files, 0 stale\n"
 
 
 def test_every_page_and_every_file_that_says_it_is_generated_is_in_the_list() -> None:
