@@ -317,6 +317,7 @@ def test_what_is_sent_to_a_worker_is_small() -> None:
     import pickle
 
     card = pidemu.load_card("emerson/deltav")
+    card.all_settings()  # builds its variants, which stay where they are
     process = pidemu.Process.from_lags(1, [10], delay=1)
     loops = [(i, Loop(f"L{i}", card.settings(GAIN=1 + i / 100, RESET=10), process)) for i in range(1000)]
     assert len(pickle.dumps(loops)) < 1_000_000  # a card goes once, and a loop is a few hundred bytes

@@ -244,6 +244,10 @@ class Card:
     def __hash__(self) -> int:
         return hash(self.id)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process is sent: all but the variants, which it builds when it needs them."""
+        return {**self.__dict__, "_variants": {}}
+
     @property
     def digest(self) -> str:
         """The card's version: SHA-256 of its file, in hexadecimal."""
