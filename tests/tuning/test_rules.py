@@ -118,3 +118,9 @@ def test_quarter_amplitude_damping_is_what_ziegler_and_nichols_get_on_an_integra
         f, slope = s * np.exp(s * L) + P["K"], np.exp(s * L) * (1 + s * L)
         s -= f / slope
     assert pytest.approx((0.224, 4.7), rel=0.01) == (math.exp(2 * math.pi * s.real / s.imag), 2 * math.pi / s.imag / L)
+
+
+def test_the_title_of_the_paper_of_1942_is_the_printed_one() -> None:
+    assert RULES["ziegler-nichols-pid"].source.startswith(
+        "Ziegler and Nichols, Optimum Settings for Automatic Controllers, Trans. ASME 64"
+    )

@@ -73,7 +73,7 @@ class TuningRule:
 
 
 _QUARTER: Final = "quarter-amplitude damping"
-_ZN: Final = "Ziegler and Nichols, OptimalTuning Settings for Automatic Controllers, Trans. ASME 64 (1942)"
+_ZN: Final = "Ziegler and Nichols, Optimum Settings for Automatic Controllers, Trans. ASME 64 (1942)"
 _MILLER: Final = "Miller, Lopez, Smith and Murrill, A Comparison of Controller Tuning Techniques, Control Engineering (1967)"
 _LUND: Final = "Astrom and Hagglund, PID Control (slides, Lund 2020)"
 _TYREUS: Final = "Tyreus and Luyben; as printed in T. Co, Standard PID Tuning Methods (Michigan Tech, 2012)"
