@@ -259,6 +259,14 @@ def test_responses_are_told_step_by_step_and_beside_those_of_another_controller(
     assert "Responses of generic/standard: K 1, Ti 20, Td 0" in text
 
 
+def test_controllers_that_differ_in_an_option_or_not_at_all_are_told_each() -> None:
+    others = ("--beside", "generic/standard K=1 Ti=20 Td=2 INTEGRAL_RULE=forward", "--beside", "generic/standard K=1 Ti=20 Td=2")
+    found = strict_json(told(*LOOP, "--json", *others, *others))
+    assert len(found["beside"]) == 4
+    text = told(*LOOP, *others)
+    assert "Responses of generic/standard: K 1, Ti 20, Td 2, INTEGRAL_RULE=forward" in text
+
+
 def test_responses_are_drawn(tmp_path: Path) -> None:
     for name in ("loop.png", "loop.svg"):
         told(*LOOP, "--plot", str(tmp_path / name), "--beside", "generic/standard K=1 Ti=20 Td=0")

@@ -156,11 +156,11 @@ def command(
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
     made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
     run = ran(made, forced)
-    runs = {_name(settings): run} | {_name(s): _in_the_same_loop(s, run, scan, forced) for s in further}
+    runs = [run, *(_in_the_same_loop(s, run, scan, forced) for s in further)]
     if picture is not None:
         from pidemu.report.response_plot import plot_responses
 
-        plot_responses(picture, runs, process.text)
+        plot_responses(picture, [(_name(r.settings), r) for r in runs], process.text)
     pv, out, choice = run.measurement, run.output, run.engine
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
@@ -169,12 +169,12 @@ def command(
     figures, responses = figures_of(made, pv, out), response_figures(run)
     margins = margins_of(made)
     if as_json:
-        beside_it = [{**r.settings.to_dict(), "responses": _told(response_figures(r))} for r in list(runs.values())[1:]]
+        beside_it = [{**r.settings.to_dict(), "responses": _told(response_figures(r))} for r in runs[1:]]
         print_json(_plain(made, choice, figures, margins, responses) | ({"beside": beside_it} if beside_it else {}))
     else:
         _print(made, choice if engine else None, figures, margins, responses)
-        for name, r in list(runs.items())[1:]:
-            _print_responses(response_figures(r), f"\nResponses of {name}")
+        for r in runs[1:]:
+            _print_responses(response_figures(r), f"\nResponses of {_name(r.settings)}")
     for note in (*settings.notes, *_notes(made, kind, margins, settled_by(made, figures))):
         echo(f"note: {note}", err=True)
 
@@ -296,8 +296,10 @@ def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, f
 
 
 def _name(settings: Settings) -> str:
-    given_dials = ", ".join(f"{name} {number(value.value)}" for name, value in settings.items() if value.given and value.active)
-    return f"{settings.card.id}: {given_dials}" if given_dials else settings.card.id
+    """Return what a controller is called beside others: card, the dials that were given, the options that are off their default."""
+    said = [f"{name} {number(value.value)}" for name, value in settings.items() if value.given and value.active]
+    said += [f"{name}={choice}" for name, choice in settings.options.items() if choice != settings.card.options[name][0]]
+    return f"{settings.card.id}: {', '.join(said)}" if said else settings.card.id
 
 
 def _step(step: Step | None) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +17,7 @@ _LARGEST: Final = 1e6
 """No larger value is drawn [%]."""
 
 
-def plot_responses(path: str | Path, runs: Mapping[str, Simulation], title: str) -> None:
+def plot_responses(path: str | Path, runs: Sequence[tuple[str, Simulation]], title: str) -> None:
     """Draw closed loops that ran: the measurements with the setpoint of the first, and the outputs below.
 
     Lines differ in colour and dash, so that they are told apart in black and white.
@@ -26,8 +26,8 @@ def plot_responses(path: str | Path, runs: Mapping[str, Simulation], title: str)
     ----------
     path : path
         The picture, ``.png`` or ``.svg``.
-    runs : mapping of str to Simulation
-        The loops by the name that the legend has.
+    runs : sequence of (str, Simulation)
+        The loops, each with its name in the legend; loops may share one.
     title : str
         Heading.
 
@@ -39,9 +39,9 @@ def plot_responses(path: str | Path, runs: Mapping[str, Simulation], title: str)
     check_picture(path)
     with picture_style():
         figure, (upper, lower) = panels((3, 2), title)
-        first = next(iter(runs.values()))
+        first = runs[0][1]
         upper.plot(first.times, first.setpoint, drawstyle="steps-post", color="#444444", linewidth=1.0, label="setpoint")
-        for i, (name, run) in enumerate(runs.items()):
+        for i, (name, run) in enumerate(runs):
             looks = {"color": COLOURS[i % len(COLOURS)], "linestyle": _DASHES[i % len(_DASHES)]}
             upper.plot(run.times, _drawn(run.measurement), label=name, **looks)  # type: ignore[arg-type]
             lower.plot(run.times, _drawn(run.output), drawstyle="steps-post", **looks)  # type: ignore[arg-type]
@@ -49,7 +49,7 @@ def plot_responses(path: str | Path, runs: Mapping[str, Simulation], title: str)
         upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, fontsize=8)
         lower.set_ylabel("output [%]")
         lower.set_xlabel("time [s]")
-        lower.set_xlim(0.0, max(float(run.times[-1]) for run in runs.values()))
+        lower.set_xlim(0.0, max(float(run.times[-1]) for _, run in runs))
         save(figure, path)
 
 
