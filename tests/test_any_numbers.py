@@ -87,8 +87,8 @@ def simulates(rng: random.Random, settings: Settings) -> None:
     made = trial(settings, parse_process(rng.choice(PROCESSES)), any_interval(rng))
     margins_of(made)
     if made.scans < 3000:
-        pv, out, _ = run_trial(made, "python")
-        assert pv.size == out.size == made.scans
+        run = run_trial(made, "python")
+        assert run.measurement.size == run.output.size == made.scans
 
 
 def runs(rng: random.Random, settings: Settings) -> None:

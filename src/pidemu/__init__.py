@@ -54,7 +54,9 @@ if TYPE_CHECKING:
     from pidemu.records.compare import Comparison, compare
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
+    from pidemu.simulation.noise import Noise
     from pidemu.simulation.simulate import Simulation, simulate
+    from pidemu.simulation.valve import Valve
     from pidemu.tuning.optimise import OptimalTuning, optimise
     from pidemu.tuning.rules import TuningRule, tuning_rules
     from pidemu.tuning.tune import Tuning, tune
@@ -120,6 +122,8 @@ _HOMES = {
     "Robustness": "analysis.robustness",
     "robustness": "analysis.robustness",
     "Settings": "settings.settings",
+    "Noise": "simulation.noise",
+    "Valve": "simulation.valve",
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
     "Tuning": "tuning.tune",
@@ -155,6 +159,7 @@ __all__ = [
     "ListError",
     "Loop",
     "LoopTable",
+    "Noise",
     "OptimalTuning",
     "PidemuError",
     "Process",
@@ -175,6 +180,7 @@ __all__ = [
     "TuningError",
     "TuningRule",
     "UnitError",
+    "Valve",
     "VectorSet",
     "Verification",
     "__version__",

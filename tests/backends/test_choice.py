@@ -23,9 +23,8 @@ from pidemu.backends.runner import Runner
 from pidemu.checks.runs import plausible
 from pidemu.errors import EngineError
 from pidemu.files.cache import warn
-from pidemu.process.hold import Plant
 from pidemu.program.ir import Program, Structure
-from pidemu.simulation.simulate import _scan_by_scan
+from pidemu.simulation.simulate import run_scan_by_scan
 from pidemu.simulation.trial import trial
 from tests.fleet.support import EVERY_ENGINE, alike
 
@@ -232,7 +231,7 @@ def test_blocks_of_every_engine_go_on_where_they_ended_with_delays_of_their_own(
 def test_a_process_of_many_lags_has_the_numbers_of_the_emulator_scan_by_scan(engine: Engine, lags: int) -> None:
     process = Process.from_lags(1.0, [1 + i / 3 for i in range(lags)], delay=2.25)
     made = trial(alike(1)[0].settings, process, 0.5, time=60)
-    pv, out = _scan_by_scan(made.controller(), Plant(process.sampled(0.5)), made.setpoint, made.load, made.initial)
+    out, pv = run_scan_by_scan(made)
     found = pidemu.simulate(made.settings, process, 0.5, time=60, engine=engine)
     assert found.measurement.tolist() == pv.tolist()
     assert found.output.tolist() == out.tolist()
@@ -248,7 +247,7 @@ def test_a_history_of_a_thousand_outputs_has_the_same_bits_in_every_engine(engin
     process = Process.from_lags(1.0, [100.0], delay=scans)
     asked: dict[str, Any] = {"time": 2.5 * scans, "load": (scans / 4, 20.0)}
     made = trial(settings, process, 1.0, **asked)
-    pv, out = _scan_by_scan(made.controller(), Plant(process.sampled(1.0)), made.setpoint, made.load, made.initial)
+    out, pv = run_scan_by_scan(made)
     result = Fleet([pidemu.Loop("A", settings, process, 1.0)]).simulate(**asked, engine=engine, keep=True)
     assert result.counts == {"done": 1}
     assert result.engines == [engine]

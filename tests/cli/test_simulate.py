@@ -287,3 +287,72 @@ def test_another_controller_or_a_picture_that_is_wrong_is_told(words: tuple[str,
     result = said(*LOOP, *words)
     assert result.status != 0
     assert message in result.err
+
+
+AROUND = (
+    "--noise",
+    "0.2",
+    "--noise-lag",
+    "3 s",
+    "--seed",
+    "4",
+    "--valve",
+    "deadband=0.5,rate=3",
+    "--load-process",
+    "gain=-0.5,lag=5",
+)
+
+
+def test_noise_valve_ramps_and_the_load_s_own_way_are_told_and_equal_those_from_python(tmp_path: Path) -> None:
+    ramps = ("--setpoint-ramp", "20", "--load-ramp", "1 min")
+    out = tmp_path / "out.csv"
+    found = strict_json(told(*LOOP, *AROUND, *ramps, "--json", "--out", str(out)))
+    assert found["ramps"] == {"setpoint": 20.0, "load": 60.0}
+    assert found["load_process"] == "-0.5/(5 s + 1)"
+    assert found["noise"] == {"deviation": 0.2, "lag": 3.0, "seed": 4}
+    assert found["valve"] == {"deadband": 0.5, "stiction": 0.0, "resolution": 0.0, "rate": 3.0}
+    run = pidemu.simulate(
+        pidemu.load_card("fisher/provox").settings(GAIN=2, RESET=4, RATE=0),
+        pidemu.Process.from_lags(1.0, [20], delay=3),
+        1.0,
+        noise=pidemu.Noise(0.2, 3.0, 4),
+        valve=pidemu.Valve(deadband=0.5, rate=3),
+        load_process=pidemu.Process.from_lags(-0.5, [5]),
+        durations=(20.0, 60.0),
+    )
+    assert run.valve is not None
+    header, *rows = out.read_text("utf-8").splitlines()
+    assert header == "time,setpoint,measurement,output,valve"
+    written = [[float(x) for x in row.split(",")] for row in rows]
+    assert written == np.column_stack([run.times, run.setpoint, run.measurement, run.output, run.valve]).tolist()
+    text = told(*LOOP, *AROUND, *ramps)
+    for line in (
+        "load to measurement -0.5/(5 s + 1)",
+        "noise 0.2 %, lag 3 s, seed 4",
+        "valve deadband=0.5,rate=3.0",
+    ):
+        assert line in " ".join(text.split())
+    assert "along a ramp of 20 s" in text
+    assert "along a ramp of 60 s" in text
+
+
+def test_another_controller_beside_has_the_same_surroundings() -> None:
+    found = strict_json(told(*LOOP, *AROUND, "--json", "--beside", "fisher/provox GAIN=2 RESET=4 RATE=0"))
+    assert found["beside"][0]["responses"] == found["responses"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--noise", "-1"), "error: noise: deviation is -1 %; give 0 or more"),
+        (("--noise-lag", "3"), "Error: --noise-lag without --noise: give the standard deviation of the noise, such as --noise 0.5"),
+        (("--noise", "1", "--seed", "-3"), "error: noise: the seed -3 is not a whole number from 0 on"),
+        (("--valve", "play=1"), "error: valve: 'play=1' is not one of deadband=..., stiction=..., resolution=..., rate=..."),
+        (("--load-process", "lag=3"), "error: 'lag=3' has no gain; add gain=1.5, for example"),
+        (("--setpoint-ramp", "-2"), "error: the duration of the setpoint ramp is -2 s; give 0 or more"),
+    ],
+)
+def test_surroundings_that_no_loop_has_are_refused(words: tuple[str, ...], message: str) -> None:
+    result = said(*LOOP, *words)
+    assert result.status == 2
+    assert message in result.err

@@ -45,8 +45,8 @@ def test_a_run_that_ends_in_the_dead_time_says_nothing_about_settling(time: floa
     fleet = pidemu.Fleet([Loop("A", settings, process, 1.0)]).simulate(setpoint=0, load=(20, 10), time=time)
     assert fleet.settled == [settled]
     made = trial(settings, process, 1.0, setpoint=0, load=(20, 10), time=time)
-    pv, out, _ = run_trial(made)
-    assert settled_by(made, figures_of(made, pv, out)) is settled
+    run = run_trial(made)
+    assert settled_by(made, figures_of(made, run.measurement, run.output)) is settled
 
 
 def test_a_run_without_a_step_is_settled() -> None:

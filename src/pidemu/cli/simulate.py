@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 import click
@@ -46,10 +46,13 @@ from pidemu.process.process import parse_process
 from pidemu.records.files import Record, write_record
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
+from pidemu.simulation.noise import Noise
 from pidemu.simulation.outcome import margins_of, settled_by, stability_of
 from pidemu.simulation.response import UNITS, ResponseFigures, response_figures
-from pidemu.simulation.simulate import Simulation, ran, simulate
+from pidemu.simulation.simulate import Simulation, run_trial
+from pidemu.simulation.surroundings import Surroundings
 from pidemu.simulation.trial import Step, Trial, trial
+from pidemu.simulation.valve import read_valve
 
 _ACTIONS: Final[Mapping[str | None, Action | None]] = {None: None, "reverse": "reverse", "direct": "direct"}
 _NAMES: Final = {
@@ -107,6 +110,21 @@ _MARGINS: Final = {
 @click.option("--time", type=TimeArgument(), help="Length of the run; by default long enough for both responses to settle.")
 @click.option("--action", type=click.Choice(["reverse", "direct"]), help="By default that of negative feedback.")
 @click.option("--limits", type=PairArgument(), help="Output limits [%]; by default the card's, 0 to 100 where it has none.")
+@click.option("--setpoint-ramp", type=TimeArgument(), help="How long the setpoint takes to move; by default it steps.")
+@click.option("--load-ramp", type=TimeArgument(), help="How long the load takes to move; by default it steps.")
+@click.option(
+    "--load-process",
+    metavar="gain=...,lag=...",
+    help="The load's own way to the measurement, gain=1 for a load at the measurement; by default it adds to the output.",
+)
+@click.option("--noise", type=float, metavar="SIZE", help="Standard deviation of noise on the measurement [%].")
+@click.option("--noise-lag", type=TimeArgument(), help="Time constant of a lag that the noise went through; else it is white.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Which noise.")
+@click.option(
+    "--valve",
+    metavar="deadband=...,stiction=...,resolution=...,rate=...",
+    help="A valve between output and process [%, %, %, %/s]; --out then has its position, too.",
+)
 @engine_option
 @click.option(
     "-o",
@@ -136,6 +154,13 @@ def command(
     time: float | None,
     action: str | None,
     limits: tuple[float, float] | None,
+    setpoint_ramp: float | None,
+    load_ramp: float | None,
+    load_process: str | None,
+    noise: float | None,
+    noise_lag: float | None,
+    seed: int,
+    valve: str | None,
     engine: str | None,
     target: str | None,
     picture: str | None,
@@ -154,8 +179,22 @@ def command(
     check_plot(picture)
     further = [_other(words, vendors) for words in others]
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
-    made = trial(settings, process, scan, time=time, action=kind, output_limits=limits, **given(setpoint=setpoint, load=load))
-    run = ran(made, forced)
+    if noise is None and noise_lag is not None:
+        raise click.UsageError("--noise-lag without --noise: give the standard deviation of the noise, such as --noise 0.5")
+    made = trial(
+        settings,
+        process,
+        scan,
+        time=time,
+        action=kind,
+        output_limits=limits,
+        noise=None if noise is None else Noise(noise, noise_lag or 0.0, seed),
+        valve=None if valve is None else read_valve(valve),
+        load_process=None if load_process is None else parse_process(load_process),
+        durations=(setpoint_ramp or 0.0, load_ramp or 0.0),
+        **given(setpoint=setpoint, load=load),
+    )
+    run = run_trial(made, forced)
     runs = [run, *(_in_the_same_loop(s, run, scan, forced) for s in further)]
     if picture is not None:
         from pidemu.report.response_plot import plot_responses
@@ -164,6 +203,7 @@ def command(
     pv, out, choice = run.measurement, run.output, run.engine
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
+        columns |= {} if run.valve is None else {"valve": run.valve}
         with beside(target, RecordError, read) as stream:
             write_record(Record(made.setpoint, pv, rows=((),) * made.scans), columns, stream)
     figures, responses = figures_of(made, pv, out), response_figures(run)
@@ -210,6 +250,7 @@ def _plain(
         "limits": made.limits,
         "setpoint": made.setpoint_step,
         "load": made.load_step,
+        **_around_plain(made.around),
         "engine": {"name": choice.engine, "reason": choice.reason},
         "figures": dict(figures),
         "responses": _told(responses),
@@ -219,6 +260,14 @@ def _plain(
     }
     safe: dict[str, Any] = json_safe(plain)
     return safe
+
+
+def _around_plain(around: Surroundings) -> dict[str, Any]:
+    """Return what is around controller and process as plain values; nothing where there is nothing."""
+    ramps = {"setpoint": around.setpoint_time, "load": around.load_time}
+    load_process = around.load_process and around.load_process.text
+    found = {"ramps": any(ramps.values()) and ramps, "load_process": load_process, "noise": around.noise, "valve": around.valve}
+    return {name: asdict(x) if is_dataclass(x) else x for name, x in found.items() if x}
 
 
 def _print(
@@ -242,8 +291,9 @@ def _print(
         ["scan", f"{number(made.scan)} s, {counted(made.scans, 'scan')}"],
         ["action", made.action],
         ["output limits", f"{number(low)} to {number(high)} %"],
-        ["setpoint step", _step(made.setpoint_step)],
-        ["load step", _step(made.load_step)],
+        ["setpoint step", _step(made.setpoint_step, made.around.setpoint_time)],
+        ["load step", _step(made.load_step, made.around.load_time)],
+        *_around(made.around),
         *([] if choice is None else [["engine", str(choice)]]),
     ]
     table(["", ""], rows)
@@ -282,7 +332,8 @@ def _other(words: str, vendors: tuple[str, ...]) -> Settings:
 
 def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, forced: Engine | None) -> Simulation:
     """Return another controller in the loop of a run, with its steps, for as long."""
-    return simulate(
+    around = run.around
+    made = trial(
         settings,
         run.process,
         scan,
@@ -291,8 +342,12 @@ def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, f
         time=float(run.times[-1]),
         output_limits=run.limits,
         initial=run.initial,
-        engine=forced,
+        noise=around.noise,
+        valve=around.valve,
+        load_process=around.load_process,
+        durations=(around.setpoint_time, around.load_time),
     )
+    return run_trial(made, forced)
 
 
 def _name(settings: Settings) -> str:
@@ -302,8 +357,22 @@ def _name(settings: Settings) -> str:
     return f"{settings.card.id}: {', '.join(said)}" if said else settings.card.id
 
 
-def _step(step: Step | None) -> str:
-    return "none" if step is None else f"{number(step[1])} % at {number(step[0])} s"
+def _step(step: Step | None, duration: float) -> str:
+    if step is None:
+        return "none"
+    over = f", along a ramp of {number(duration)} s" if duration else ""
+    return f"{number(step[1])} % at {number(step[0])} s{over}"
+
+
+def _around(around: Surroundings) -> Iterator[list[str]]:
+    """Yield a row for each thing that is around controller and process."""
+    if around.load_process is not None:
+        yield ["load to measurement", around.load_process.text]
+    if (noise := around.noise) is not None:
+        kind = f"lag {number(noise.lag)} s" if noise.lag else "white"
+        yield ["noise", f"{number(noise.deviation)} %, {kind}, seed {noise.seed}"]
+    if around.valve is not None:
+        yield ["valve", around.valve.text]
 
 
 def _short(x: float) -> str:

@@ -132,11 +132,11 @@ def _mend(members: Group, columns: dict[str, Floats], records: Floats | None) ->
     away = []
     for i in np.flatnonzero(~np.isfinite(list(columns.values())).all(axis=0)).tolist():
         trial = members.trial(int(members.places[i]))
-        pv, out, _ = run_trial(trial)
-        for name, value in figures_of(trial, pv, out).items():
+        run = run_trial(trial)
+        for name, value in figures_of(trial, run.measurement, run.output).items():
             columns[name][i] = value
         if records is not None:
-            records[:, : trial.scans, i] = out, pv
+            records[:, : trial.scans, i] = run.output, run.measurement
         away.append(int(members.places[i]))
     return away
 

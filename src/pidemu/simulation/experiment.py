@@ -10,7 +10,7 @@ import numpy as np
 from pidemu.arrays import Floats
 from pidemu.program.blocks import magnitude
 from pidemu.program.ir import Expr, Name, Program, select
-from pidemu.simulation.closed import Parts
+from pidemu.simulation.parts import Parts
 
 FIGURES: Final = {"iae": "% s", "peak": "%", "travel": "%", "at_low": "s", "at_high": "s", "swing": "%"}
 """The states that hold what is measured, with their units.

@@ -14,13 +14,15 @@ from pidemu.arrays import Floats
 from pidemu.backends.choice import Choice, checked, for_record, safe_runner
 from pidemu.backends.engine_names import Engine
 from pidemu.backends.python import starting
-from pidemu.controller.controller import Controller
 from pidemu.process.hold import Plant
 from pidemu.process.process import Process
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.experiment import integral_of_error
+from pidemu.simulation.noise import Noise
+from pidemu.simulation.surroundings import NOTHING_ELSE, Surroundings
 from pidemu.simulation.trial import Step, Trial, first_scan, trial
+from pidemu.simulation.valve import MovingValve, Valve
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,10 @@ class Simulation:
         Setpoint, measurement and output before [%].
     note : str
         Why the scan interval is longer than the loop would take; empty where it is not.
+    around : Surroundings
+        Noise, valve, the load's own way, and how long setpoint and load take to move.
+    valve : ndarray of float, shape (n,), or None
+        Where the valve stands [%]; ``None`` where there is none, and the output itself reaches the process.
     """
 
     settings: Settings
@@ -65,6 +71,8 @@ class Simulation:
     engine: Choice
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0)
     note: str = ""
+    around: Surroundings = NOTHING_ELSE
+    valve: Floats | None = None
 
     @property
     def error(self) -> Floats:
@@ -89,6 +97,10 @@ def simulate(
     action: Action | None = None,
     output_limits: tuple[float, float] | None = None,
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
+    noise: float | Noise | None = None,
+    valve: Valve | None = None,
+    load_process: Process | None = None,
+    durations: tuple[float, float] = (0.0, 0.0),
     engine: Engine | None = None,
 ) -> Simulation:
     """Run the emulated controller of a card in a closed loop with a process, from rest.
@@ -117,6 +129,16 @@ def simulate(
         Low and high output limit [%]; by default the card's, 0 to 100 where it has none.
     initial : tuple of float
         Setpoint, measurement and output [%] before; the process is at rest there.
+    noise : float or Noise, optional
+        Noise on the measurement, or the standard deviation of white noise [%]. The figures of a loop are those of the measurement
+        as it is read, noise included.
+    valve : Valve, optional
+        Dead band, stiction, resolution and rate of the valve between output and process.
+    load_process : Process, optional
+        The load's own way to the measurement; by default the load adds to what reaches the process. ``Process(1)`` is a load at
+        the measurement itself.
+    durations : tuple of float
+        How long setpoint and load take to move [s], along ramps, which stand between scans; 0 for steps.
     engine : {"python", "numpy", "numba", "c"}, optional
         Which back end runs the loop; all give the same bits. By default the quickest for the number of scans.
 
@@ -154,21 +176,16 @@ def simulate(
         action=action,
         output_limits=output_limits,
         initial=initial,
+        noise=noise,
+        valve=valve,
+        load_process=load_process,
+        durations=durations,
     )
-    return ran(made, forced)
+    return run_trial(made, forced)
 
 
-def ran(made: Trial, forced: Engine | None = None) -> Simulation:
-    """Return a trial with the signals that it made; arguments as of `run_trial`."""
-    pv, out, choice = run_trial(made, forced)
-    return Simulation(
-        made.settings, made.process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
-        made.load_step, choice, made.initial, made.note,
-    )  # fmt: skip
-
-
-def run_trial(made: Trial, forced: Engine | None = None) -> tuple[Floats, Floats, Choice]:
-    """Run a trial; return measurement and output [%], each of shape (scans,), and the engine.
+def run_trial(made: Trial, forced: Engine | None = None) -> Simulation:
+    """Return a trial with the signals that it made.
 
     Parameters
     ----------
@@ -177,19 +194,19 @@ def run_trial(made: Trial, forced: Engine | None = None) -> tuple[Floats, Floats
     forced : {"python", "numpy", "numba", "c"}, optional
         The engine; by default the quickest.
     """
-    controller, sp, load = made.controller(), made.setpoint, made.load
-    program = made.program(controller)
+    program, inputs = made.program(made.controller()), made.inputs
     choice = for_record(program, made.scans, forced)
     under_way = (min(length, made.scans) for length in program.lengths)  # what comes later is not seen
     state = [*starting(program), *(deque([0.0] * length) for length in under_way)]
     with np.errstate(all="ignore"):
-        out, pv = safe_runner(program, choice).run(state, [sp, load], made.scans)
+        out, pv, *valve = safe_runner(program, choice).run(state, inputs, made.scans)
     if not (np.isfinite(pv).all() and np.isfinite(out).all()):  # what a card does then is the emulator's to know
-        model = made.process.sampled(made.scan)
-        plant = Plant(replace(model, scans=min(model.scans, made.scans)))  # what comes later is not seen
-        pv, out = _scan_by_scan(controller, plant, sp, load, made.initial)
-        return pv, out, Choice("python", "scan by scan, as the measurement outgrows all numbers")
-    return pv, out, choice
+        out, pv, *valve = run_scan_by_scan(made)
+        choice = Choice("python", "scan by scan, as the measurement outgrows all numbers")
+    return Simulation(
+        made.settings, made.process, made.scan, made.action, made.limits, made.times, made.setpoint, pv, out, made.setpoint_step,
+        made.load_step, choice, made.initial, made.note, made.around, valve[0] if valve else None,
+    )  # fmt: skip
 
 
 def compare_loops(
@@ -224,17 +241,32 @@ def _figures(settings: Settings, process: Process, scan: float | None, factor: f
     return loop_figures(settings.law(scan), process, factor, iae)
 
 
-def _scan_by_scan(
-    controller: Controller, plant: Plant, sp: Floats, load: Floats, initial: tuple[float, float, float]
-) -> tuple[Floats, Floats]:
-    """Close the loop of an emulated controller; return measurement and output [%]."""
-    ranges = controller.settings.own_ranges
-    own_sp, rest_pv, rest_output = ranges.pv.from_percent(sp).tolist(), initial[1], initial[2]
-    pv, out = np.empty(sp.size), np.empty(sp.size)
+def run_scan_by_scan(made: Trial) -> tuple[Floats, ...]:
+    """Run a trial with the emulator; return output, measurement and, where there is a valve, its position [%].
+
+    Parameters
+    ----------
+    made : Trial
+        What to run.
+    """
+    controller, inputs = made.controller(), made.inputs
+    ranges, around, (_, rest_pv, rest) = made.settings.own_ranges, made.around, made.initial
+    plant, load_way = _plant(made.process, made), None if around.load_process is None else _plant(around.load_process, made)
+    valve = None if around.valve is None else MovingValve(around.valve, rest, made.scan)
+    load, noise = (x.tolist() for x in (*inputs[1:], np.zeros(made.scans))[:2])
+    rows = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for i, (r, d) in enumerate(zip(own_sp, load.tolist(), strict=True)):
-            y = rest_pv + plant.measure()
-            u = controller.scan(r, ranges.pv.from_percent(y))
-            pv[i], out[i] = y, ranges.op.in_percent(u)
-            plant.move(out[i] - rest_output + d)
-    return pv, out
+        for r, d, n in zip(ranges.pv.from_percent(inputs[0]).tolist(), load, noise, strict=True):
+            y = rest_pv + plant.measure() + (0.0 if load_way is None else load_way.measure()) + n
+            u = ranges.op.in_percent(controller.scan(r, ranges.pv.from_percent(y)))
+            reaches = u if valve is None else valve.move(u)
+            plant.move(reaches - rest + (d if load_way is None else 0.0))
+            if load_way is not None:
+                load_way.move(d)
+            rows.append((u, y) if valve is None else (u, y, reaches))
+    return tuple(np.array(column) for column in zip(*rows, strict=True))
+
+
+def _plant(process: Process, made: Trial) -> Plant:
+    model = process.sampled(made.scan)
+    return Plant(replace(model, scans=min(model.scans, made.scans)))  # what comes later is not seen

@@ -23,6 +23,9 @@ from pidemu.program.specialise import specialise
 from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.closed import closed_loop
+from pidemu.simulation.noise import Noise
+from pidemu.simulation.surroundings import NOTHING_ELSE, Surroundings
+from pidemu.simulation.valve import Valve
 
 Step = tuple[float, float]
 
@@ -57,6 +60,8 @@ class Trial:
         When and how far setpoint and load step [s, %].
     note : str
         Why the scan interval is longer than the loop would take; empty where it is not.
+    around : Surroundings
+        Noise, valve, the load's own way, and how long setpoint and load take to move.
     """
 
     settings: Settings
@@ -69,6 +74,7 @@ class Trial:
     setpoint_step: Step | None
     load_step: Step | None
     note: str = ""
+    around: Surroundings = NOTHING_ELSE
 
     @property
     def times(self) -> Floats:
@@ -78,21 +84,29 @@ class Trial:
     @property
     def setpoint(self) -> Floats:
         """The setpoint at the scans [%], shape (scans,)."""
-        return self.initial[0] + self._signal(self.setpoint_step)
+        return self.initial[0] + self._signal(self.setpoint_step, self.around.setpoint_time)
 
     @property
     def load(self) -> Floats:
         """The load at the scans [%], shape (scans,)."""
-        return self._signal(self.load_step)
+        return self._signal(self.load_step, self.around.load_time)
 
     def first(self, at: float) -> int:
         """Return the first scan at or after a time [s]."""
         return first_scan(at, self.scan, self.scans)
 
-    def _signal(self, step: Step | None) -> Floats:
+    @property
+    def inputs(self) -> list[Floats]:
+        """What the loop's program reads, in its order, each of shape (scans,)."""
+        noise = self.around.noise
+        return [self.setpoint, self.load, *([] if noise is None else [noise.at(self.scans, self.scan)])]
+
+    def _signal(self, step: Step | None, duration: float) -> Floats:
         if step is None:
             return np.zeros(self.scans)
-        return np.where(np.arange(self.scans) >= self.first(step[0]), step[1], 0.0)
+        if not duration:
+            return np.where(np.arange(self.scans) >= self.first(step[0]), step[1], 0.0)
+        return step[1] * np.clip((self.times - step[0]) / duration, 0.0, 1.0)
 
     def controller(self) -> Controller:
         """Return the controller at rest; where nothing integrates, its bias is such that its output is the initial one there."""
@@ -104,7 +118,7 @@ class Trial:
         """Return the closed loop of a controller at rest (`pidemu.simulation.closed.closed_loop`)."""
         at_rest = replace(controller.program, initial=tuple(controller.state.values()))
         rest = (self.initial[1], self.initial[2])
-        return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, self.settings.own_ranges)
+        return closed_loop(specialise(at_rest), self.process.sampled(self.scan), rest, self.settings.own_ranges, self.around)
 
 
 def first_scan(at: float, scan: float, scans: int) -> int:
@@ -137,9 +151,15 @@ def trial(
     action: Action | None = None,
     output_limits: tuple[float, float] | None = None,
     initial: tuple[float, float, float] = (50.0, 50.0, 50.0),
+    noise: float | Noise | None = None,
+    valve: Valve | None = None,
+    load_process: Process | None = None,
+    durations: tuple[float, float] = (0.0, 0.0),
 ) -> Trial:
     """Choose what is not given, and check what is; the parameters and errors are those of `pidemu.simulate`."""
     process.check_percent()
+    if load_process is not None:
+        load_process.check_percent()
     own = scan_for(settings, process) if scan is None else plausible("scan interval", scan, INTERVAL, ProcessError)
     if not own > 0:
         raise ProcessError(f"the scan interval {own:g} s is not a positive number; give the time between two scans")
@@ -151,6 +171,8 @@ def trial(
             f"{h:g} s to {_MOST_SCANS * h:g} s"
         )
     sp_step, load_step = _step("setpoint", setpoint, length / 20, length), _step("load", load, length / 2, length)
+    real_valve = valve if valve is not None and not valve.is_ideal else None
+    around = Surroundings(_noise(noise), real_valve, load_process, *map(_duration_of, ("setpoint", "load"), durations))
     chosen = action or _negative_feedback(settings, process)
     limits = limits_in_percent(settings, output_limits)
     if not limits[0] < limits[1]:  # not a number compares false as well
@@ -169,7 +191,7 @@ def trial(
             f"{_ENOUGH_SCANS:,} scans; give the interval, or a shorter time"
         )
     )
-    return Trial(settings, process, h, scans, chosen, limits, initial, sp_step, load_step, note)
+    return Trial(settings, process, h, scans, chosen, limits, initial, sp_step, load_step, note, around)
 
 
 def _affordable(h: float, cards: float, length: float) -> float:
@@ -194,6 +216,20 @@ def _negative_feedback(settings: Settings, process: Process) -> Action:
             f"be positive; give the gain the other sign"
         )
     return "reverse" if right else "direct"
+
+
+def _noise(given: float | Noise | None) -> Noise | None:
+    """Return noise, or ``None`` where there is none."""
+    noise = given if isinstance(given, Noise) or given is None else Noise(given)
+    return noise if noise is not None and noise.deviation else None
+
+
+def _duration_of(name: str, given: float) -> float:
+    """Return how long a ramp takes [s]; 0 for a step."""
+    duration = plausible(f"the duration of the {name} ramp", given, TIME, ProcessError)
+    if duration < 0:
+        raise ProcessError(f"the duration of the {name} ramp is {duration:g} s; give 0 or more")
+    return duration
 
 
 def _step(name: str, given: float | Step, at: float, end: float) -> Step | None:
