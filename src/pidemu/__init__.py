@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from pidemu.records.compare import Comparison, compare
     from pidemu.records.files import Record, read_record
     from pidemu.settings.settings import Settings
+    from pidemu.simulation.cascade import CascadeRun, simulate_cascade
     from pidemu.simulation.noise import Noise
     from pidemu.simulation.simulate import Simulation, simulate
     from pidemu.simulation.valve import Valve
@@ -126,6 +127,8 @@ _HOMES = {
     "Valve": "simulation.valve",
     "Simulation": "simulation.simulate",
     "simulate": "simulation.simulate",
+    "CascadeRun": "simulation.cascade",
+    "simulate_cascade": "simulation.cascade",
     "Tuning": "tuning.tune",
     "OptimalTuning": "tuning.optimise",
     "optimise": "tuning.optimise",
@@ -141,6 +144,7 @@ __all__ = [
     "Answer",
     "Card",
     "CardError",
+    "CascadeRun",
     "CertificateError",
     "Code",
     "Comparison",
@@ -201,6 +205,7 @@ __all__ = [
     "retrofit",
     "robustness",
     "simulate",
+    "simulate_cascade",
     "test_batch",
     "tune",
     "tuning_rules",

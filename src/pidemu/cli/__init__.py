@@ -23,6 +23,7 @@ _COMMANDS: Final = {
     "run": "Run a card on recorded signals.",
     "compare": "Run cards on the same signals and compare their outputs.",
     "simulate": "Run a card in a closed loop with a process.",
+    "cascade": "Run two cards in cascade.",
     "fit": "Fit a process to the record of a bump test.",
     "relay": "Put a relay in place of the controller, and read the oscillation.",
     "optimise": "Find the best settings of a card for a process, within limits.",

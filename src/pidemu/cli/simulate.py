@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, Final
@@ -35,8 +33,8 @@ from pidemu.cli.common import (
 )
 from pidemu.cli.inputs import inputs
 from pidemu.cli.loop import check_plot, plot_option
-from pidemu.errors import RecordError, SettingError
-from pidemu.excerpt import quoted
+from pidemu.cli.responses import controller_in_words, name_of, plain_responses, print_responses, short, step_text
+from pidemu.errors import RecordError
 from pidemu.files.outputs import check_outputs
 from pidemu.files.tables import counted
 from pidemu.files.writing import beside
@@ -48,10 +46,10 @@ from pidemu.settings.action import Action
 from pidemu.settings.settings import Settings
 from pidemu.simulation.noise import Noise
 from pidemu.simulation.outcome import margins_of, settled_by, stability_of
-from pidemu.simulation.response import UNITS, ResponseFigures, response_figures
+from pidemu.simulation.response import ResponseFigures, response_figures
 from pidemu.simulation.simulate import Simulation, run_trial
 from pidemu.simulation.surroundings import Surroundings
-from pidemu.simulation.trial import Step, Trial, trial
+from pidemu.simulation.trial import Trial, trial
 from pidemu.simulation.valve import read_valve
 
 _ACTIONS: Final[Mapping[str | None, Action | None]] = {None: None, "reverse": "reverse", "direct": "direct"}
@@ -63,21 +61,6 @@ _NAMES: Final = {
     "at_high": "at the high limit",
     "swing": "range of the error at the end",
     "error": "last error",
-}
-_RESPONSES: Final = {
-    "size": "step",
-    "ie": "IE",
-    "iae": "IAE",
-    "ise": "ISE",
-    "itae": "ITAE",
-    "largest_error": "largest error, or overshoot",
-    "overshoot": "overshoot",
-    "decay_ratio": "decay ratio",
-    "rise_time": "rise time, 10 to 90 %",
-    "settling_time": "settling time, 5 %",
-    "peak_output": "largest move of the output",
-    "travel": "travel of the output",
-    "last_error": "last error",
 }
 _SETTLED: Final = {True: "yes", False: "NO", None: "not known"}
 _MARGINS: Final = {
@@ -177,7 +160,7 @@ def command(
     read = inputs()
     check_outputs({"--out": target}, RecordError, read)  # now, and not after the work
     check_plot(picture)
-    further = [_other(words, vendors) for words in others]
+    further = [controller_in_words("--beside", words, vendors) for words in others]
     forced, kind = checked(asked_for(engine)), _ACTIONS[action]
     if noise is None and noise_lag is not None:
         raise click.UsageError("--noise-lag without --noise: give the standard deviation of the noise, such as --noise 0.5")
@@ -199,7 +182,7 @@ def command(
     if picture is not None:
         from pidemu.report.response_plot import plot_responses
 
-        plot_responses(picture, [(_name(r.settings), r) for r in runs], process.text)
+        plot_responses(picture, [(name_of(r.settings), r) for r in runs], process.text)
     pv, out, choice = run.measurement, run.output, run.engine
     if target is not None:
         columns = {"time": made.times, "setpoint": made.setpoint, "measurement": pv, "output": out}
@@ -209,12 +192,12 @@ def command(
     figures, responses = figures_of(made, pv, out), response_figures(run)
     margins = margins_of(made)
     if as_json:
-        beside_it = [{**r.settings.to_dict(), "responses": _told(response_figures(r))} for r in runs[1:]]
+        beside_it = [{**r.settings.to_dict(), "responses": plain_responses(response_figures(r))} for r in runs[1:]]
         print_json(_plain(made, choice, figures, margins, responses) | ({"beside": beside_it} if beside_it else {}))
     else:
         _print(made, choice if engine else None, figures, margins, responses)
         for r in runs[1:]:
-            _print_responses(response_figures(r), f"\nResponses of {_name(r.settings)}")
+            print_responses(response_figures(r), f"\nResponses of {name_of(r.settings)}")
     for note in (*settings.notes, *_notes(made, kind, margins, settled_by(made, figures))):
         echo(f"note: {note}", err=True)
 
@@ -253,7 +236,7 @@ def _plain(
         **_around_plain(made.around),
         "engine": {"name": choice.engine, "reason": choice.reason},
         "figures": dict(figures),
-        "responses": _told(responses),
+        "responses": plain_responses(responses),
         "settled": settled_by(made, figures),
         "stable": stability_of(made, margins),
         "margins": None if margins is None else {name: getattr(margins, name) for name in ("stable", *_MARGINS.values())},
@@ -291,43 +274,21 @@ def _print(
         ["scan", f"{number(made.scan)} s, {counted(made.scans, 'scan')}"],
         ["action", made.action],
         ["output limits", f"{number(low)} to {number(high)} %"],
-        ["setpoint step", _step(made.setpoint_step, made.around.setpoint_time)],
-        ["load step", _step(made.load_step, made.around.load_time)],
+        ["setpoint step", step_text(made.setpoint_step, made.around.setpoint_time)],
+        ["load step", step_text(made.load_step, made.around.load_time)],
         *_around(made.around),
         *([] if choice is None else [["engine", str(choice)]]),
     ]
     table(["", ""], rows)
     heading(f"\nResult, errors from the {'start' if made.load_step is None else 'load step'} on")
     settled = _SETTLED[settled_by(made, figures)]
-    rows = [[_NAMES[name], _short(x), COLUMNS[name]] for name, x in figures.items()]
+    rows = [[_NAMES[name], short(x), COLUMNS[name]] for name, x in figures.items()]
     table(["", "", ""], [*rows, ["settled at the end", settled, ""]], right=(1,))
-    _print_responses(responses, "\nResponses, from each step on")
+    print_responses(responses, "\nResponses, from each step on")
     if margins is not None:
         heading("\nMargins, sampled and within the limits")
-        rows = [[name, _short(getattr(margins, attribute))] for name, attribute in _MARGINS.items()]
+        rows = [[name, short(getattr(margins, attribute))] for name, attribute in _MARGINS.items()]
         table(["", ""], [*rows, ["stable", "yes" if margins.stable else "NO"]], right=(1,))
-
-
-def _print_responses(responses: Sequence[ResponseFigures], title: str) -> None:
-    if responses:
-        heading(title)
-        names = [name for name in UNITS if any(not math.isnan(getattr(r, name)) for r in responses)]
-        rows = [[_RESPONSES[name], *(_short(getattr(r, name)) for r in responses), UNITS[name]] for name in names]
-        table(["", *(r.step for r in responses), ""], rows, right=tuple(range(1, len(responses) + 1)))
-
-
-def _told(responses: Sequence[ResponseFigures]) -> list[dict[str, Any]]:
-    told: list[dict[str, Any]] = json_safe([asdict(response) for response in responses])
-    return told
-
-
-def _other(words: str, vendors: tuple[str, ...]) -> Settings:
-    """Return the settings of another controller, as they stand behind a command."""
-    try:
-        card, *values = shlex.split(words)
-    except ValueError:  # an open quotation mark, or nothing
-        raise SettingError(f"--beside '{quoted(words)}' is not a card with settings; write \"CARD NAME=VALUE...\"") from None
-    return load_card(card, vendors).settings(assignments(values))
 
 
 def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, forced: Engine | None) -> Simulation:
@@ -350,20 +311,6 @@ def _in_the_same_loop(settings: Settings, run: Simulation, scan: float | None, f
     return run_trial(made, forced)
 
 
-def _name(settings: Settings) -> str:
-    """Return what a controller is called beside others: card, the dials that were given, the options that are off their default."""
-    said = [f"{name} {number(value.value)}" for name, value in settings.items() if value.given and value.active]
-    said += [f"{name}={choice}" for name, choice in settings.options.items() if choice != settings.card.options[name][0]]
-    return f"{settings.card.id}: {', '.join(said)}" if said else settings.card.id
-
-
-def _step(step: Step | None, duration: float) -> str:
-    if step is None:
-        return "none"
-    over = f", along a ramp of {number(duration)} s" if duration else ""
-    return f"{number(step[1])} % at {number(step[0])} s{over}"
-
-
 def _around(around: Surroundings) -> Iterator[list[str]]:
     """Yield a row for each thing that is around controller and process."""
     if around.load_process is not None:
@@ -373,7 +320,3 @@ def _around(around: Surroundings) -> Iterator[list[str]]:
         yield ["noise", f"{number(noise.deviation)} %, {kind}, seed {noise.seed}"]
     if around.valve is not None:
         yield ["valve", around.valve.text]
-
-
-def _short(x: float) -> str:
-    return "-" if math.isnan(x) else number(x, 4)

@@ -38,7 +38,7 @@ class Noise:
     Examples
     --------
     >>> Noise(0.5, seed=3).at(1000, 1.0).std().round(2)
-    np.float64(0.49)
+    np.float64(0.5)
     """
 
     deviation: float

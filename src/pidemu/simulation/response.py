@@ -16,6 +16,8 @@ from pidemu.simulation.trial import first_scan
 
 SETTLED: Final = 0.05
 """A response has settled where the error stays within this part of the step, or of its largest error after a load step."""
+_NO_SWING: Final = 0.01
+"""A swing that begins a response is at least this part of its largest."""
 _RISE: Final = (0.1, 0.9)
 """Between these parts of its step a measurement rises."""
 
@@ -141,7 +143,8 @@ def _decay_ratio(error: Floats) -> float:
     if ends.size < 2:
         return 0.0
     lobes = [float(np.max(np.abs(lobe))) for lobe in np.split(error, ends)]
-    return lobes[2] / lobes[0]
+    first = next(i for i, lobe in enumerate(lobes) if not lobe < _NO_SWING * max(lobes))  # what an earlier response left
+    return lobes[first + 2] / lobes[first] if first + 2 < len(lobes) else 0.0
 
 
 def _rise_time(part: Floats, h: float) -> float:
