@@ -10,7 +10,7 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 import pidemu
@@ -81,7 +81,21 @@ def test_a_pi_controller_that_cancels_the_lag_leaves_an_integrator_with_dead_tim
     assert found.stable
 
 
+RESONANT = Process(1.078125, [-1, 0.09375, -0.001171875 + 0.0234081848j, -0.001171875 - 0.0234081848j])
+
+
+@pytest.mark.parametrize("over", [1 + 1e-6, 1.001, 1.1, 1 - 1e-6, 0.999])
+@pytest.mark.parametrize("zeta", [0.3, 0.02, 1e-4])
+def test_a_resonance_that_just_reaches_a_loop_gain_of_1_is_seen(zeta: float, over: float) -> None:
+    """``1/(s^2 + 2 zeta s + 1)`` peaks at ``1/(2 zeta sqrt(1 - zeta^2))``: with a loop gain of 1 a phase margin begins."""
+    p = complex(-zeta, math.sqrt(1 - zeta**2))
+    process = Process(1, [p, p.conjugate()])
+    peak = 1 / (2 * zeta * math.sqrt(1 - zeta**2))
+    assert math.isfinite(loop_figures(law(over / peak), process).phase_margin) == (over > 1)
+
+
 @given(controller=laws(), process=unstable_ones())
+@example(controller=law(0.095703125), process=RESONANT)
 def test_stability_and_margins_are_python_controls(controller: Law, process: Process) -> None:
     L = controller_of(controller) * transfer_function(process) * process.feedback_sign
     poles = control.feedback(L, 1).poles()

@@ -26,6 +26,14 @@ _QUIET: Final = 1e-3
 """A loop gain below this counts only until the phase has come round."""
 _DELAY_ENDS: Final = (20.0, 4000.0)
 """At least and at most this much phase of the dead time is looked at [rad]."""
+_LIGHT: Final = 0.5
+"""Below this damping ratio a pair of poles has a peak of its own."""
+_ACROSS: Final = np.linspace(-4.0, 4.0, 81)
+"""Where a peak is looked at, in its half width at half its power."""
+_NEAR: Final = 0.05
+"""The logarithm of a loop gain that may come to 1 between two frequencies."""
+_TOUCHES: Final = 4
+"""How often the top of such a peak is sought by a parabola: each time the distance is squared, roughly."""
 _DAMPING: Final = 1e-6
 """Least damping of a process pole in frequency responses: at an undamped one, these would be infinite."""
 
@@ -170,6 +178,28 @@ def _ends(loop: OpenLoop) -> tuple[float, float]:
     return low, high
 
 
+def _resonances(loop: OpenLoop, low: float, high: float) -> Floats:
+    """Return frequencies across the peaks and dips that lightly damped poles and zeros of the process make [rad/s]."""
+    found = [
+        abs(r) * (1 + min(abs(r.real) / abs(r), 1.0) * _ACROSS)
+        for r in (*loop.damped.poles, *loop.damped.zeros)
+        if r.imag > 0 and abs(r.real) < _LIGHT * abs(r)
+    ]
+    w = np.concatenate([np.empty(0), *found])
+    return w[(low < w) & (w < high)]
+
+
+def _touches(w: Floats, sizes: Floats) -> Floats:
+    """Return where a peak just below a loop gain of 1, or a dip just above it, has its top between the frequencies [rad/s]."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.log(w), np.log(sizes)
+        a, b = (y[1:-1] - y[:-2]) / (x[1:-1] - x[:-2]), (y[2:] - y[1:-1]) / (x[2:] - x[1:-1])
+        bend = (b - a) / (x[2:] - x[:-2])
+        top = (x[1:-1] + x[:-2]) / 2 - a / (2 * bend)
+        near = (np.abs(y[1:-1]) < _NEAR) & (a * b < 0) & (y[1:-1] * bend > 0) & (x[:-2] < top) & (top < x[2:])
+    return np.setdiff1d(np.exp(top[near]), w)
+
+
 def picture_of(loop: OpenLoop) -> OpenLoopResponse:
     """Return the open loop at enough frequencies."""
     low, high = _ends(loop)
@@ -182,7 +212,7 @@ def picture_of(loop: OpenLoop) -> OpenLoopResponse:
         stop = min(high, most, max(loud[-1] if loud.size else 0.0, least))
         even = np.linspace(low, stop, math.ceil((stop - low) * turn / _TURN) + 2)
         w, beyond = np.unique(np.concatenate([w[w < stop], even])), w[w > stop]
-    w = np.insert(w, 0, low * np.array([1e-4, 1e-2]))  # as good as zero frequency
+    w = np.unique(np.concatenate([low * np.array([1e-4, 1e-2]), w, _resonances(loop, low, w[-1])]))  # from as good as zero on
     values = loop(w)
     for _ in range(24):
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a process that lets nothing through has no phase
@@ -192,4 +222,9 @@ def picture_of(loop: OpenLoop) -> OpenLoopResponse:
             break
         between = np.sqrt(w[rough] * w[rough + 1])
         w, values = np.insert(w, rough + 1, between), np.insert(values, rough + 1, loop(between))
+    for _ in range(_TOUCHES):
+        between = _touches(w, np.abs(values))
+        w, values = np.concatenate([w, between]), np.concatenate([values, loop(between)])
+        order = np.argsort(w)
+        w, values = w[order], values[order]
     return OpenLoopResponse(w, values, beyond, loop(beyond))
