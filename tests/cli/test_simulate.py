@@ -329,7 +329,7 @@ def test_noise_valve_ramps_and_the_load_s_own_way_are_told_and_equal_those_from_
     for line in (
         "load to measurement -0.5/(5 s + 1)",
         "noise 0.2 %, lag 3 s, seed 4",
-        "valve deadband=0.5,rate=3.0",
+        "valve deadband=0.5,rate=3",
     ):
         assert line in " ".join(text.split())
     assert "along a ramp of 20 s" in text

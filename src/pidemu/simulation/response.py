@@ -42,7 +42,7 @@ class ResponseFigures:
     overshoot : float
         The latter per step; NaN after a load step.
     decay_ratio : float
-        Third swing of the error over the first; 0 where there are not so many.
+        Third swing of the error over the first; 0 where there are not so many, NaN with noise on the measurement.
     rise_time : float
         From 10 to 90 % of the setpoint step [s]; NaN where it is not reached, and after a load step.
     settling_time : float
@@ -128,7 +128,7 @@ def _figures(run: Simulation, name: str, size: float, start: int, end: int) -> R
         itae=float(np.trapezoid(np.arange(error.size) * h * np.abs(error), dx=h)),
         largest_error=largest,
         overshoot=largest / abs(size) if name == "setpoint" else math.nan,
-        decay_ratio=_decay_ratio(error),
+        decay_ratio=math.nan if run.around.noise else _decay_ratio(error),  # noise crosses zero too
         rise_time=_rise_time(1 - error / size, h) if name == "setpoint" else math.nan,
         settling_time=_settling_time(error, band, h),
         peak_output=float(np.max(np.abs(output - before))),

@@ -8,6 +8,7 @@ from typing import Final
 
 from pidemu.errors import ProcessError
 from pidemu.excerpt import quoted
+from pidemu.formatting import exactly
 from pidemu.plausible import LEVEL, plain_number, plausible
 from pidemu.program.blocks import limited, rounded, towards
 from pidemu.program.ir import Expr, Name, expr, select
@@ -67,7 +68,7 @@ class Valve:
     def text(self) -> str:
         """The valve as `read_valve` takes it."""
         numbers = {name: getattr(self, name) for name in (*_PARTS, "rate")}
-        return ",".join(f"{name}={x!r}" for name, x in numbers.items() if x and x != math.inf)
+        return ",".join(f"{name}={exactly(x)}" for name, x in numbers.items() if x and x != math.inf)
 
 
 def read_valve(text: str) -> Valve:
