@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import pidemu
-from pidemu.card.model.verification import Trace
+from pidemu.card.model.verification import RecordedTrace
 from pidemu.checks import check_file
 from pidemu.checks.traces import compare_trace
 from tests.checks.bench import VALID, edited, written
@@ -25,7 +25,7 @@ def test_the_page_is_what_the_cards_say_today() -> None:
 
 
 @pytest.mark.parametrize(("name", "trace"), TRACES, ids=[f"{name}-{trace.file}" for name, trace in TRACES])
-def test_every_recorded_trace_is_reproduced_within_its_tolerance(name: str, trace: Trace) -> None:
+def test_every_recorded_trace_is_reproduced_within_its_tolerance(name: str, trace: RecordedTrace) -> None:
     c = compare_trace(pidemu.load_card(name), trace, DATA)
     assert c.compared.sum() > 100
     assert c.difference <= trace.tolerance, (
@@ -34,7 +34,7 @@ def test_every_recorded_trace_is_reproduced_within_its_tolerance(name: str, trac
 
 
 @pytest.mark.parametrize(("name", "trace"), TRACES, ids=[f"{name}-{trace.file}" for name, trace in TRACES])
-def test_every_recorded_trace_says_what_ran_and_a_gain_one_thousandth_off_is_seen(name: str, trace: Trace) -> None:
+def test_every_recorded_trace_says_what_ran_and_a_gain_one_thousandth_off_is_seen(name: str, trace: RecordedTrace) -> None:
     assert (DATA / trace.file).read_text(encoding="utf-8").startswith("#"), "which program, version and settings"
     card = pidemu.load_card(name)
     gain = next(
@@ -43,7 +43,9 @@ def test_every_recorded_trace_says_what_ran_and_a_gain_one_thousandth_off_is_see
     value = trace.given[gain]
     assert isinstance(value, float | int)
     other = {**trace.given, gain: value * 1.001}
-    wrong = compare_trace(card, Trace(**{**{f: getattr(trace, f) for f in Trace.__dataclass_fields__}, "given": other}), DATA)
+    wrong = compare_trace(
+        card, RecordedTrace(**{**{f: getattr(trace, f) for f in RecordedTrace.__dataclass_fields__}, "given": other}), DATA
+    )
     assert wrong.difference > max(trace.tolerance, 1e-7)
 
 

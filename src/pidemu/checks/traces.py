@@ -13,7 +13,7 @@ from pidemu.arrays import Flags, Floats
 from pidemu.card.library import is_builtin
 from pidemu.card.load import Card
 from pidemu.card.model.card_file import interval_of
-from pidemu.card.model.verification import Trace
+from pidemu.card.model.verification import RecordedTrace
 from pidemu.controller.controller import Controller
 from pidemu.errors import PidemuError, Problem, RecordError, suggest
 from pidemu.records.files import Record, read_record
@@ -45,14 +45,14 @@ class TraceComparison:
     worst: int
 
 
-def compare_trace(card: Card, trace: Trace, folder: Path) -> TraceComparison:
+def compare_trace(card: Card, trace: RecordedTrace, folder: Path) -> TraceComparison:
     """Run a card on the signals of a recorded trace.
 
     Parameters
     ----------
     card : Card
         The card.
-    trace : Trace
+    trace : RecordedTrace
         One of its traces.
     folder : Path
         Where the files are.
@@ -85,7 +85,7 @@ def compare_trace(card: Card, trace: Trace, folder: Path) -> TraceComparison:
     return _compared(found, recorded, compared)
 
 
-def _column(record: Record, trace: Trace) -> Floats:
+def _column(record: Record, trace: RecordedTrace) -> Floats:
     """Return the recorded outputs."""
     if trace.column == "output" and record.output is not None:
         return record.output
@@ -99,7 +99,7 @@ def _column(record: Record, trace: Trace) -> Floats:
         raise RecordError(f"{trace.file}, column {trace.column}: {error}") from None
 
 
-def _outputs(controller: Controller, trace: Trace, inputs: Record, auto: Floats) -> Floats:
+def _outputs(controller: Controller, trace: RecordedTrace, inputs: Record, auto: Floats) -> Floats:
     """Return what the card makes of the signals, with the changes of settings between stretches."""
     ends = [*(c.at for c in trace.changes), auto.size]
     found, start = [], 0

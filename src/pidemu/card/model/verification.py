@@ -39,7 +39,7 @@ class TraceChange(Part):
 
 
 @part(frozen=True, slots=True, kw_only=True)
-class Trace(Part):
+class RecordedTrace(Part):
     """A recorded trace: outputs of the real program, or of a second reading of the equation, which the card reproduces."""
 
     file: Annotated[
@@ -97,9 +97,9 @@ class CardVerification(Part):
         Name | None,
         means("With `V1`: the package of the Python package index that the test runs, with its version: `simple-pid 2.0.1`."),
     ] = None
-    records: Annotated[list[Trace], Only(max_length=50), means("Recorded traces, which `pidemu check` runs the card against.")] = (
-        field(default_factory=list)
-    )
+    records: Annotated[
+        list[RecordedTrace], Only(max_length=50), means("Recorded traces, which `pidemu check` runs the card against.")
+    ] = field(default_factory=list)
     note: Annotated[Text | None, means("What was compared, and what was not; with `V3` why there is nothing better.")] = None
 
 
