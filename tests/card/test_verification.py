@@ -27,7 +27,7 @@ def test_the_page_is_what_the_cards_say_today() -> None:
 @pytest.mark.parametrize(("name", "trace"), TRACES, ids=[f"{name}-{trace.file}" for name, trace in TRACES])
 def test_every_recorded_trace_is_reproduced_within_its_tolerance(name: str, trace: RecordedTrace) -> None:
     c = compare_trace(pidemu.load_card(name), trace, DATA)
-    assert c.compared.sum() > 100
+    assert c.compared.sum() > 90
     assert c.difference <= trace.tolerance, (
         f"scan {c.worst}: {c.found[c.worst]!r}, recorded {c.recorded[c.worst]!r}, {c.difference:.3g}"
     )

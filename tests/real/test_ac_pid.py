@@ -1,4 +1,4 @@
-"""ArduPilot's AC_PID against its documented computation; no real output is at hand."""
+"""ArduPilot's AC_PID against its documented computation; the recorded outputs of the real one stand in its card."""
 
 from __future__ import annotations
 

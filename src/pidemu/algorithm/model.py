@@ -133,6 +133,11 @@ class Algorithm(Generic[X]):
         return self.form is Form.SERIES
 
     @property
+    def has_gain_on_sum(self) -> bool:
+        """Whether one gain multiplies the sum of the terms, and with it what the integral remembers."""
+        return self.integral.holds != "ki e" and self.form is not Form.PARALLEL and not self.velocity
+
+    @property
     def velocity(self) -> bool:
         """Whether increments are added to the last output."""
         return self.implementation == "velocity"

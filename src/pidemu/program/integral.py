@@ -15,7 +15,8 @@ from pidemu.program.terms import Terms
 class HeldSum:
     """How the integral's state counts in the sum of the terms.
 
-    The state holds the integral of ``ki e``, of ``e/Ti`` with the gain on the whole sum, or of ``e`` with both applied afterwards.
+    The state holds the integral of ``ki e``, of ``e/Ti`` with the gain on the whole sum, or of ``e`` with both applied afterwards; in
+    the parallel form of ``e`` with ``ki`` applied afterwards, and no gain on the sum.
 
     Attributes
     ----------
@@ -23,27 +24,36 @@ class HeldSum:
         Gain on the whole sum.
     time : Name or None
         Integral time that the state is divided by.
+    factor : Name or None
+        Integral gain that the state is multiplied by.
     """
 
-    gain: Name | None
-    time: Name | None
+    gain: Name | None = None
+    time: Name | None = None
+    factor: Name | None = None
 
     @classmethod
     def of(cls, b: Builder, a: Algorithm) -> HeldSum:
         """Return how the state counts with an algorithm."""
         if a.integral.holds == "ki e":
-            return cls(None, None)
+            return cls()
+        if not a.has_gain_on_sum:
+            return cls(factor=b.coefficient("ki", a.ki, "integral gain, signed for action", "%/%/s")) if a.ki else cls()
         gain = b.coefficient("kp", a.kp, "gain on the sum of the terms, signed for action", "%/%")
         if a.integral.holds == "e/Ti" or not a.ki:
-            return cls(gain, None)
+            return cls(gain)
         return cls(gain, b.coefficient("Ti", a.kp / a.ki, "integral time", "s"))
 
     def term(self, state: Expr) -> Expr:
         """Return the integral term of a state."""
+        if self.factor is not None:
+            return self.factor * state
         return state if self.time is None else state / self.time
 
     def state(self, term: Expr) -> Expr:
         """Return the state of an integral term."""
+        if self.factor is not None:
+            return term / self.factor
         return term if self.time is None else term * self.time
 
     def output(self, total: Expr) -> Expr:
