@@ -1,4 +1,4 @@
-"""ArduPilot's AC_PID against its documented computation; the recorded outputs of the real one stand in its card."""
+"""ArduPilot's AC_PID against its documented computation; recorded outputs of the real one stand in its card."""
 
 from __future__ import annotations
 

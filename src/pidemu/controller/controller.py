@@ -18,6 +18,7 @@ from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
 from pidemu.columns.functions import isfinite
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
+from pidemu.controller.idle_terms import idle_dials, silenced, with_gains
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches
 from pidemu.errors import PidemuError, ScanError, suggest
@@ -130,6 +131,7 @@ class Controller:
         self._bias = plausible("bias", bias, LEVEL, ScanError)
         self._initial_output = plausible("initial output", initial_output, LEVEL, ScanError)
         self._kept = 0.0  # what an integral held that was switched off while running
+        self._terms_run_on = not self._bias
         self._signals: tuple[str, ...] = ()
         self._mode: Mode = "power-up"
         self._count = 0
@@ -142,7 +144,7 @@ class Controller:
         self._faults = settings.equation.faults or Faults()
         self._largest = largest_signal(settings.card)
         self._running = running
-        self.program: Program = running.program
+        self.program: Program = running.program if running.plain is None else running.plain
         self._scan, self._state = running.compiled.scan, running.state
         self._lost = set(running.not_finite())
         self._know_the_everyday_scan()
@@ -163,7 +165,17 @@ class Controller:
                 title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
             )
 
-        return Running(lambda h: settings.algorithm(own_units=True, scan=h), built, self.interval)
+        idle = idle_dials(settings) if self._terms_run_on else {}
+        whole = with_gains(settings, idle) if idle else None
+        if whole is None:
+            return Running(lambda h: settings.algorithm(own_units=True, scan=h), built, self.interval)
+        sets = frozenset(idle.values())
+        return Running(
+            lambda h: whole.algorithm(own_units=True, scan=h),
+            lambda a, h: silenced(built, a, h, sets),
+            self.interval,
+            built(settings.algorithm(own_units=True, scan=self.interval), self.interval),
+        )
 
     def _know_the_everyday_scan(self) -> None:
         """Keep in mind whether a scan without anything special goes straight to the program."""
@@ -213,7 +225,7 @@ class Controller:
         ScanError
             There has been a scan, the program has no such state, or a value is not a finite number.
         """
-        names = [q.name for q in self.program.states]
+        names = list(self._running.named())
         if self._count:
             raise ScanError(f"states are set before the first scan, and there have been {self._count}; reset() first")
         for name, value in states.items():
@@ -245,6 +257,9 @@ class Controller:
         sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
+        if self._terms_run_on and self._running.plain is not None:  # nothing has run yet that could run on
+            self._terms_run_on = False
+            self._use(self.settings, self._running_with(self.settings))
         last = self._running.rest(sp, pv, output)
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
@@ -309,6 +324,8 @@ class Controller:
 
     def _constant_left_by(self, new: Settings) -> float:
         """Return what the integral leaves behind where new settings switch it off and the card keeps it."""
+        if self._terms_run_on and {"gain", "integral"} & set(idle_dials(new).values()):
+            return 0.0
         old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
         if a.ki or a.velocity or a.transfer.without_integral != "kept" or a.transfer.way.loads_output:
             return 0.0

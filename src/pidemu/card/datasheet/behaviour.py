@@ -130,11 +130,12 @@ def _changes(q: Equation) -> str:
         return "a changed gain moves P and D"
     if q.transfer.changes == "bumpless":
         return "do not move the output: the integral takes up what P becomes less"
+    idle = "; with a gain of 0 its sum and history go on unseen" if q.transfer.zero_gain == "runs-on" else ""
     return {
         "ki e": "leave the integral as it is; a changed gain moves P and D",
         "e/Ti": "leave the integral of e/Ti as it is; a changed gain moves the whole sum",
         "e": "leave the integral of e as it is; a changed gain or integral time moves the whole sum",
-    }[q.integral.holds]
+    }[q.integral.holds] + idle
 
 
 def _action(q: Equation) -> str:
