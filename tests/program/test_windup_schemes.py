@@ -394,13 +394,15 @@ def test_under_a_constant_error_the_output_of_every_card_reaches_its_limit(card_
 
 
 def _out_of_the_way(equation: Equation) -> dict[str, float]:
-    """Wide limits of the integral, which stop it before the output's limit, as they are meant to, and no limit of the output's rate."""
+    """Return wide limits of the integral, which stop it before the output's limit as they are meant to, and no rate limit."""
     limits = equation.integral.limits
-    wide = {n: -1000.0 if limits is not None and limits.low == n else 1000.0 for n, s in equation.settings.items() if _narrow(s)}
+    low = None if limits is None else limits.low
+    wide = {n: -1000.0 if low == n else 1000.0 for n, s in equation.settings.items() if _narrow(s)}
     return wide | {n: s.default for n, s in equation.settings.items() if s.sets == "output-rate" and s.default is not None}
 
 
 def _narrow(s: Setting) -> bool:
+    """Tell whether a dial limits the integral to less than the output needs."""
     return s.sets == "integral-limit" and (s.default is None or abs(s.default) < 1000)
 
 

@@ -15,8 +15,8 @@ from pidemu.program.terms import Terms
 class HeldSum:
     """How the integral's state counts in the sum of the terms.
 
-    The state holds the integral of ``ki e``, of ``e/Ti`` with the gain on the whole sum, or of ``e`` with both applied afterwards; in
-    the parallel form of ``e`` with ``ki`` applied afterwards, and no gain on the sum.
+    The state holds the integral of ``ki e``, of ``e/Ti`` with the gain on the whole sum, or of ``e`` with both applied afterwards;
+    in the parallel form of ``e`` with ``ki`` applied afterwards, and no gain on the sum.
 
     Attributes
     ----------
