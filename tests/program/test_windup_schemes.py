@@ -398,7 +398,8 @@ def _out_of_the_way(equation: Equation) -> dict[str, float]:
     limits = equation.integral.limits
     low = None if limits is None else limits.low
     wide = {n: -1000.0 if low == n else 1000.0 for n, s in equation.settings.items() if _narrow(s)}
-    return wide | {n: s.default for n, s in equation.settings.items() if s.sets == "output-rate" and s.default is not None}
+    rest = {n: s.default for n, s in equation.settings.items() if s.sets in ("integral-limit", "output-rate")}
+    return {n: x for n, x in rest.items() if x is not None} | wide
 
 
 def _narrow(s: Setting) -> bool:

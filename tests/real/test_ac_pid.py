@@ -199,6 +199,18 @@ def test_every_output_is_a_single_precision_number() -> None:
     assert (found == found.astype(np.float32)).all()
 
 
+def test_a_changed_derivative_gain_acts_at_once_on_what_the_filter_holds() -> None:
+    record = signals(14).always_auto()
+    oracle, ctl = AcPid(1.0, 0.3, 0.4, 50.0, (0, 0, 0.5)), controller(1.0, 0.3, 0.4, 50.0, (0, 0, 0.5), scan=0.1)
+    first, second = record.part(0, 100), record.part(100, 200)
+    expected = outputs(oracle, first, 0.1)
+    assert close(ctl.run(first.sp, first.pv), expected, TOLERANCE, oracle.size)
+    oracle.D = F(1.2)
+    ctl.change(D=1.2)
+    expected = outputs(oracle, second, 0.1)
+    assert close(ctl.run(second.sp, second.pv), expected, TOLERANCE, oracle.size)
+
+
 def test_changed_gains_leave_the_integral_as_it_stands() -> None:
     record = signals(12).always_auto()
     oracle, ctl = AcPid(1.0, 0.3, 0.1, 50.0, (0, 0, 5.0)), controller(1.0, 0.3, 0.1, 50.0, (0, 0, 5.0), scan=0.02)

@@ -54,6 +54,12 @@ def _number(name: str, given: object) -> float:
         raise ScanError(f"{name}: {error}") from None
 
 
+def _gain_ratio(old: Settings, new: Settings) -> float:
+    """Return what a derivative that is remembered without its gain becomes with another one."""
+    before, now = old.algorithm(own_units=True).kd, new.algorithm(own_units=True).kd
+    return now / before if before else 1.0
+
+
 class Controller:
     """The controller of a card, with settings, running at a scan interval.
 
@@ -307,6 +313,8 @@ class Controller:
         weights = (old.algorithm().c, new.algorithm().c)
         other_signal = weights[0] != weights[1]  # what the derivative remembers is another signal's
         kept = {n: x for n, x in before.named().items() if not (other_signal and n in ("x1", "x2", "x3"))}
+        if old.equation.derivative.holds == "d" and "D" in kept:
+            kept["D"] *= _gain_ratio(old, new)
         after.take_over(kept, last)
         if last:
             if new.algorithm().transfer.changes == "bumpless" and self._mode in ("automatic", "cascade"):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pidemu.algorithm.model import Algorithm
 from pidemu.program import blocks
 from pidemu.program.blocks import Builder
-from pidemu.program.ir import Expr, Name, equal
+from pidemu.program.ir import Expr, Name, equal, select
 from pidemu.program.terms import Terms
 
 
@@ -121,6 +121,18 @@ class Positional:
     def left_for_integral(self, out: Expr, D: Expr | None) -> Expr:
         """Return the state with which the terms make an output, from which the feedforward is taken already."""
         return self.held.state(blocks.difference(self.held.total(out), self.P, D))
+
+    def left_by_hand(self, manual: Expr) -> Expr:
+        """Return the state with which the terms make the operator's output, from which the feedforward is taken already.
+
+        Where that output is the operator's number times the gain, the number itself is the sum of the terms.
+        """
+        if self.held.gain is None or self.a.transfer.manual_output != "gain-times-operator":
+            return self.left_for_integral(manual, self.t.D)
+        given = Name("manual")
+        own: Expr = given if self.a.action.gain_sign > 0 else 0.0 - given  # of an error that the vendor forms the other way round
+        total = select(equal(given, given), own, self.held.total(manual))
+        return self.held.state(blocks.difference(total, self.P, self.t.D))
 
     @property
     def begun(self) -> Expr:

@@ -84,7 +84,8 @@ def _derivative(d: Derivative[Reference]) -> str:
         return "backward difference, unfiltered"
     if d.rule is Rule.LAGGED_DIFFERENCE:
         return "difference of the signal and its own lag; without filter time none"
-    return f"{d.rule.value}, filtered" + ("; unfiltered where Tf is 0" if _may_be_off(d) else "")
+    own = "; the gain comes after the filter" if d.holds == "d" else ""
+    return f"{d.rule.value}, filtered" + ("; unfiltered where Tf is 0" if _may_be_off(d) else "") + own
 
 
 def _may_be_off(d: Derivative[Reference]) -> bool:
