@@ -60,8 +60,10 @@ def test_engines_agree_with_terms_that_run_on(engine: pidemu.Engine) -> None:
 
 def test_a_program_without_idle_terms_is_what_is_printed() -> None:
     ctl = controller("crazyflie/pid", kp=1.0)
-    assert [q.name for q in ctl.program.states if q.name == "I"] == []
-    assert "I" in ctl.state
+    assert "I" not in [q.name for q in ctl.lean_program.states]
+    assert "I" in [q.name for q in ctl.program.states]
+    settings = pidemu.load_card("crazyflie/pid").settings(kp=1.0)
+    assert "integral" not in pidemu.code(settings, "python").text.split("def scan")[1]
 
 
 def test_a_time_of_zero_and_a_card_that_says_nothing_have_no_idle_terms() -> None:

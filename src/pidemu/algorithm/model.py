@@ -135,7 +135,8 @@ class Algorithm(Generic[X]):
     @property
     def has_gain_on_sum(self) -> bool:
         """Whether one gain multiplies the sum of the terms, and with it what the integral remembers."""
-        return self.integral.holds != "ki e" and self.form is not Form.PARALLEL and not self.velocity
+        alone = self.form is Form.PARALLEL and self.integral.holds == "e"  # the integral gain comes afterwards, and only that
+        return self.integral.holds != "ki e" and not alone and not self.velocity
 
     @property
     def velocity(self) -> bool:

@@ -150,7 +150,7 @@ class Controller:
         self._faults = settings.equation.faults or Faults()
         self._largest = largest_signal(settings.card)
         self._running = running
-        self.program: Program = running.program if running.plain is None else running.plain
+        self.program: Program = running.program
         self._scan, self._state = running.compiled.scan, running.state
         self._lost = set(running.not_finite())
         self._know_the_everyday_scan()
@@ -193,6 +193,11 @@ class Controller:
         return self._running.named()
 
     @property
+    def lean_program(self) -> Program:
+        """The scan program without terms that run on with a gain of 0: what is printed, as nothing changes there."""
+        return self._running.plain or self.program
+
+    @property
     def output(self) -> float:
         """The last output."""
         return self._running[StateRole.OUTPUT]
@@ -231,7 +236,7 @@ class Controller:
         ScanError
             There has been a scan, the program has no such state, or a value is not a finite number.
         """
-        names = list(self._running.named())
+        names = [q.name for q in self.program.states]
         if self._count:
             raise ScanError(f"states are set before the first scan, and there have been {self._count}; reset() first")
         for name, value in states.items():
