@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import importlib.metadata
+import os
 from pathlib import Path
 
 import pytest
 
 import pidemu
+from pidemu.card.library import card_entry
 from pidemu.card.model.verification import RecordedTrace
 from pidemu.checks import check_file
 from pidemu.checks.traces import compare_trace
@@ -79,7 +81,7 @@ def _tree(file: Path) -> ast.Module:
 
 
 HEAD = "# the bench itself, version 1\n"
-GOOD = HEAD + "sp,pv,output\n50,50,40\n"
+GOOD = HEAD + "sp,pv,output\n" + "50,50,40\n50,49,42\n" * 20
 RECORDED = """\
 verification:
   class: V1
@@ -100,7 +102,7 @@ def outside(folder: Path, csv: str | None, record: str = RECORDED) -> Path:
 
 def recorded(folder: Path, gain: float = 2.0) -> str:
     """Return what a controller of the same law and rules, written here, makes of a record."""
-    pv, auto = [50.0, 50.0, 48.0, 47.0, 47.5, 60.0], [0, 1, 1, 1, 1, 1]
+    pv, auto = [50.0, 50.0, 48.0, 47.0, 47.5, 60.0, *[49.0] * 20], [0, *[1] * 25]
     lines, last, integral = ["sp,pv,auto,manual,output"], 40.0, 0.0
     for y, a in zip(pv, auto, strict=True):
         e = 50.0 - y
@@ -140,6 +142,13 @@ def test_a_trace_that_changes_after_the_check_is_run_again(tmp_path: Path) -> No
     ("csv", "record", "message"),
     [
         (None, RECORDED, "bench.csv: cannot be read: No such file or directory"),
+        (HEAD + "sp,pv,output\n50,50,40\n", RECORDED, "shows nothing: at least 20 scans are compared, in which the output moves"),
+        (HEAD + "sp,pv,output\n" + "50,50,40\n" * 30, RECORDED, "shows nothing"),
+        (
+            GOOD,
+            RECORDED.replace("scan: 1 s", "changes: [{at: 99, given: {GAIN: 4}}], scan: 1 s"),
+            "do not ascend within its 40 scans",
+        ),
         (HEAD + "sp,pv\n50,50\n", RECORDED, "bench.csv: no column 'output' among sp, pv"),
         (HEAD + "sp,pv,output\n50,50,none\n", RECORDED, "'none' is not a number"),
         (HEAD + "pv,output\n50,50\n", RECORDED, "no column 'sp' among pv, output"),
@@ -150,7 +159,7 @@ def test_a_trace_that_changes_after_the_check_is_run_again(tmp_path: Path) -> No
             RECORDED.replace("file: bench.csv", "file: ../bench.csv"),
             "not the name of a CSV file",
         ),
-        (HEAD + "sp,pv,output\n50,50,nan\n", RECORDED, "recorded is np.float64(nan)"),
+        (GOOD + "50,50,nan\n", RECORDED, "the card does not reproduce bench.csv"),
     ],
 )
 def test_a_trace_that_cannot_be_run_is_told_where_the_card_names_it(
@@ -165,3 +174,23 @@ def test_settings_changed_in_a_trace_are_changed_in_the_card(tmp_path: Path) -> 
     changed = RECORDED.replace("scan: 1 s", "changes: [{at: 3, given: {GAIN: 4}}], scan: 1 s")
     (problem,) = check_file(outside(tmp_path, recorded(tmp_path), changed))
     assert "in scan 5 it gives" in problem.message or "in scan 3 it gives" in problem.message
+
+
+def test_a_link_and_a_pipe_are_not_read(tmp_path: Path) -> None:
+    file = outside(tmp_path, None)
+    (tmp_path / "secret").write_text("root:x:0:0", encoding="utf-8")
+    (file.parent / "bench.csv").symlink_to(tmp_path / "secret")
+    (problem,) = check_file(file)
+    assert problem.message == "bench.csv is not a plain file; put the file itself beside the card"
+    (file.parent / "bench.csv").unlink()
+    os.mkfifo(file.parent / "bench.csv")
+    (problem,) = check_file(file)
+    assert problem.message == "bench.csv is not a plain file; put the file itself beside the card"
+
+
+def test_the_list_of_cards_shows_no_claim_that_is_not_shown(tmp_path: Path) -> None:
+    file = outside(tmp_path, recorded(tmp_path))
+    assert card_entry(file, "nobody/bench").verification == "V1"
+    (file.parent / "bench.csv").write_text(recorded(tmp_path, gain=3.0), encoding="utf-8")
+    with pytest.raises(pidemu.CardError, match="does not reproduce bench"):
+        card_entry(file, "nobody/bench")

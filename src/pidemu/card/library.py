@@ -210,6 +210,14 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
     return CardError(problems) if problems else card
 
 
+def _refuse_wrong(card: Card) -> None:
+    from pidemu.checks import remembered_check
+
+    problems = remembered_check(card)
+    if problems:
+        raise CardError(problems)
+
+
 def is_known_good(file: Path, card_id: str | None = None, shown: str | None = None) -> bool:
     """Tell whether a check of this very card by this very pidemu had nothing to say.
 
@@ -263,6 +271,8 @@ def card_entry(file: Path, card_id: str) -> CardEntry:
         card = load_file(file, card_id)
         if is_builtin(file):
             keep(card)
+        elif card.verification.class_ != "V3":  # a claim, which counts where it is shown
+            _refuse_wrong(card)
         return CardEntry(card_id, card.title, status_counts(card), card.verification.class_)
     return CardEntry(card_id, short["title"], short["status"], short["verification"])
 

@@ -20,6 +20,8 @@ from pidemu.records.files import Record, read_record
 
 _MOST: Final = 100_000
 """Scans of a trace; a check is done whenever the card is loaded."""
+_LEAST: Final = 20
+"""Scans that show a controller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +64,18 @@ def compare_trace(card: Card, trace: RecordedTrace, folder: Path) -> TraceCompar
     PidemuError
         A file cannot be read, or the card cannot be run so.
     """
-    own = read_record(folder / trace.file, needed=() if trace.inputs else ("sp", "pv"))
-    inputs = own if trace.inputs is None else read_record(folder / trace.inputs)
+    own = _read(folder / trace.file, () if trace.inputs else ("sp", "pv"))
+    inputs = own if trace.inputs is None else _read(folder / trace.inputs, ("sp", "pv"))
     recorded = _column(own, trace)
     if recorded.size > _MOST:
         raise RecordError(f"{trace.file} has {recorded.size:,} scans; at most {_MOST:,} are compared")
     if recorded.size != inputs.sp.size:
         raise RecordError(f"{trace.file} has {recorded.size} scans, its inputs {trace.inputs} have {inputs.sp.size}")
+    ends = [0, *(c.at for c in trace.changes), recorded.size]
+    if ends != sorted(set(ends)):
+        raise RecordError(
+            f"{trace.file}: changes at {', '.join(map(str, ends[1:-1]))} do not ascend within its {recorded.size} scans"
+        )
     controller = Controller(
         card.settings(trace.given),
         scan=interval_of(trace.scan),
@@ -82,7 +89,16 @@ def compare_trace(card: Card, trace: RecordedTrace, folder: Path) -> TraceCompar
     if controller.program.precision == "float32":
         recorded = recorded.astype(np.float32).astype(float)
     compared = auto > 0 if trace.rows == "automatic" else np.ones(recorded.size, dtype=bool)
+    if compared.sum() < _LEAST or np.ptp(recorded[compared]) == 0:
+        raise RecordError(f"{trace.file} shows nothing: at least {_LEAST} scans are compared, in which the output moves")
     return _compared(found, recorded, compared)
+
+
+def _read(file: Path, needed: tuple[str, ...]) -> Record:
+    """Return a trace; who writes a card shall not have other files read."""
+    if file.is_symlink() or (file.exists() and not file.is_file()):
+        raise RecordError(f"{file.name} is not a plain file; put the file itself beside the card")
+    return read_record(file, needed=needed)
 
 
 def _column(record: Record, trace: RecordedTrace) -> Floats:
