@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,6 +58,11 @@ _SENSIBLE: dict[Role, st.SearchStrategy[float]] = {
     Role.CLOSED_LOOP_TIME: st.floats(1, 600),
 }
 """Canonical values by role (specs/equations.md, section 1)."""
+
+
+def copied(file: Path) -> str:
+    """Return a built-in card's text as a user may copy it: without saying how it was verified, which only pidemu's tests show."""
+    return re.sub(r"^verification:\n(?:  .*\n)+", "", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
 
 
 def option_combinations(card: Card) -> list[dict[str, str]]:
