@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,12 @@ from pidemu.testing.strategies import scans_of as scans_of  # noqa: PLC0414
 
 WIDE = (-1e12, 1e12)
 """Output limits that no test signal reaches."""
+
+
+def copied(file: Path) -> str:
+    """Return a built-in card's text as a user may copy it: without saying how it was verified, which only pidemu's tests show."""
+    return re.sub(r"^verification:\n(?:  .*\n)+", "", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
 
 def dials_of(card_id: str) -> st.SearchStrategy[dict[str, object]]:
     """Valid settings of the card of this id, by name."""

@@ -57,8 +57,8 @@ def test_the_commands_and_options_that_a_page_names_are_there(page: Path) -> Non
     with click.Context(cli) as context:
         there = {name: cli.get_command(context, name) for name in cli.list_commands(context)}
     parameters = [parameter for command in (cli, *there.values()) if command for parameter in command.params]
-    known = {option for parameter in parameters for option in (*parameter.opts, *parameter.secondary_opts)}
-    text = re.sub(r"^```(sh|python)\n.*?^```$", "", read(page), flags=re.DOTALL | re.MULTILINE)
+    known = {"--pidemu-examples"} | {option for parameter in parameters for option in (*parameter.opts, *parameter.secondary_opts)}
+    text = re.sub(r"^```(sh|python|py)\n.*?^```$", "", read(page), flags=re.DOTALL | re.MULTILINE)
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) <= known
     assert set(re.findall(r"`pidemu (\w+)", text)) <= set(there)
 

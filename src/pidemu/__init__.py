@@ -215,6 +215,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "testing":  # a room, not a name in one
+        return import_module("pidemu.testing")
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module 'pidemu' has no attribute '{name}'")

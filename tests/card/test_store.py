@@ -28,6 +28,7 @@ from pidemu.card.wheel import compile_builtin_cards
 from pidemu.cli import cli
 from pidemu.errors import CardError
 from pidemu.files.reading import read_text
+from tests.helpers import copied
 
 on_every_card = pytest.mark.parametrize("name", pidemu.cards())
 GOOD = builtin_folder() / "generic" / "standard.yaml"
@@ -46,7 +47,7 @@ def own(tmp_path: Path) -> Path:
     """A card of the user's own."""
     file = tmp_path / "mine" / "generic" / "own.yaml"
     file.parent.mkdir(parents=True)
-    file.write_text(GOOD.read_text(encoding="utf-8"), encoding="utf-8")
+    file.write_text(copied(GOOD), encoding="utf-8")
     return file
 
 
@@ -299,7 +300,7 @@ def test_two_builds_are_the_same(built: Path, tmp_path: Path) -> None:
 
 
 def test_a_built_in_card_that_was_edited_is_read_from_its_file(built: Path, own: Path) -> None:
-    text = own.read_text(encoding="utf-8")
+    text = GOOD.read_text(encoding="utf-8")
     assert store.find(digest_of(text)) is not None
     own.write_text(f"{text}\n# a remark\n", encoding="utf-8")
     assert store.find(digest_of(read_text(own, CardError, CARD))) is None

@@ -23,7 +23,7 @@ from pidemu.conversion.refused import ConversionRefusedError
 from pidemu.settings.settings import Settings
 from tests.checks.bench import edited
 from tests.conversion.support import Floats, continuous, difference, settings_that_act
-from tests.helpers import made_up_card
+from tests.helpers import copied, made_up_card
 
 PROVOX = {"GAIN": 2, "RESET": 4, "RATE": 0.1}
 TERM_FILTERS = (
@@ -330,7 +330,7 @@ class TestRounding:
         assert conversion.certificate.dials == ()
 
     def test_rounding_makes_an_exact_conversion_approximate(self, tmp_path: Path) -> None:
-        text = (Path(__file__).parents[2] / "vendors/generic/standard.yaml").read_text(encoding="utf-8")
+        text = copied(Path(__file__).parents[2] / "vendors/generic/standard.yaml")
         changed = edited(text, ("K: {sets: gain, ", "K: {sets: gain, resolution: 0.5, "), ("vendor: Generic", "vendor: Acme"))
         file = tmp_path / "acme" / "coarse.yaml"
         file.parent.mkdir()

@@ -44,6 +44,18 @@ _ENGINEERING = added("signals", "engineering")
 _EU = ('unit: "%/%"', "unit: eu/eu")
 _NO_ALPHA: tuple[Edit, ...] = ((ALPHA, ""), (ALPHA_EVIDENCE, ""))
 
+_RECORDS = "records: [{file: bench.csv, given: {GAIN: 2, RESET: 60}, scan: 1 s}]"
+_NO_RECORDS = (
+    "needs 'records': recorded outputs beside the card, which the check runs it against; without them leave 'verification' out, "
+    "which is V3"
+)
+
+
+def _verified(text: str) -> tuple[Edit, ...]:
+    """Return edits that have the card say how it was verified."""
+    return (("quirks:\n", f"verification: {{{text}}}\nquirks:\n"),)
+
+
 STATEMENTS: tuple[Case, ...] = (
     ("reject_unused_settings", (("ratio: ALPHA", "ratio: 0.1"),), ("17:3: nothing uses 'ALPHA'",)),
     (
@@ -122,6 +134,41 @@ STATEMENTS: tuple[Case, ...] = (
         "reject_fields_without_evidence",
         (("  options: {status", "  options.STRUCTURE.choices: {status"),),
         ("20:5: no evidence covers 'options.STRUCTURE.default'",),
+    ),
+    (
+        "reject_evidence_for_nothing",
+        (("quirks:\n", "  emulation: {status: assumed, note: a guess}\nquirks:\n"),),
+        ("42:3: how the scan program was verified stands under 'verification', not under evidence",),
+    ),
+    ("reject_unfounded_verification", _verified("class: V3"), ("42:1: 'V3' needs 'note': why there is nothing better",)),
+    (
+        "reject_unfounded_verification",
+        _verified("class: V3, note: none was found, test: tests/real/test_king.py"),
+        ("42:49: 'V3' is by the law alone; with 'test' it is V1 or V2",),
+    ),
+    ("reject_unfounded_verification", _verified("class: V1, source: manual, at: p. 9"), (f"42:1: 'V1' {_NO_RECORDS}",)),
+    (
+        "reject_unfounded_verification",
+        _verified("class: V2, source: manual, at: p. 9, test: tests/real/test_king.py"),
+        (f"42:1: 'V2' {_NO_RECORDS}",),
+    ),
+    (
+        "reject_unfounded_verification",
+        _verified(f"class: V1, {_RECORDS}"),
+        ("42:1: 'V1' needs 'at'", "42:1: 'V1' needs 'source'"),
+    ),
+    (
+        "reject_unfounded_verification",
+        _verified(f"class: V1, source: manual, at: p. 9, package: simple-pid 2.0.1, {_RECORDS}"),
+        ("42:53: 'package' is for cards that come with pidemu; remove it",),
+    ),
+    (
+        "reject_unfounded_verification",
+        (
+            ("read: 2026-01-02}", "read: 2026-01-02}\n  toy: {title: Toy bench, read: 2026-01-02, product: another bench}"),
+            *_verified(f"class: V2, source: toy, at: p. 9, {_RECORDS}"),
+        ),
+        ("43:35: 'toy' is about another bench, which verifies nothing of this card; write V3 and why",),
     ),
     (
         "reject_overlapping_options",

@@ -145,8 +145,8 @@ CASES: tuple[Case, ...] = (
     ),
     (
         "reject_bad_integral",
-        ((CHOICE, "{form: parallel, integral: {holds: e}}"),),
-        ("23:48: 'holds: e' needs one gain for all terms, which the parallel form does not have; remove it",),
+        ((CHOICE, "{form: parallel, integral: {holds: e/Ti}}"),),
+        ("23:48: 'holds: e/Ti' needs one gain for all terms, which the parallel form does not have; remove it",),
     ),
     (
         "reject_bad_windup",

@@ -116,7 +116,8 @@ def test_show_prints_a_data_sheet() -> None:
         "to automatic the integral goes on from where it followed the output",
         "at power-up the integral starts at zero, whatever the output was; D starts from a signal of zero: a",
         "kick",
-        "changed settings leave the integral of e as it is; a changed gain or integral time moves the whole sum",
+        "changed settings leave the integral of e as it is; a changed gain or integral time moves the whole sum;",
+        "with a gain of 0 its sum and history go on unseen",
         "NaN, infinity in SP or PV: they are computed with",
     ]
 

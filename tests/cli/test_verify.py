@@ -10,6 +10,7 @@ import pytest
 
 import pidemu
 from tests.cli.helpers import said, strict_json, told, with_another_filter
+from tests.helpers import copied
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--tag", "TIC-101", "--date", "2026-07-01")
 NOT_COMPARED = "not compared:\n  - its date, and where in a band a largest value lies (worst_at, largest_at)\n"
@@ -92,7 +93,7 @@ def test_json_says_the_same(certificate: Path) -> None:
 def test_a_card_of_ones_own_comes_from_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cards" / "acme").mkdir(parents=True)
-    text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
+    text = copied(Path(pidemu.load_card("generic/series").document.path))
     (tmp_path / "cards" / "acme" / "block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     signed = told("convert", "acme/block", "K=2", "Ti=15", "--to", "generic/standard", "--vendors", "cards", "--json")
     (tmp_path / "c.json").write_text(signed, encoding="utf-8")

@@ -18,6 +18,7 @@ from pidemu.conversion.refused import ConversionRefusedError, QuestionError
 from pidemu.process.process import Process
 from tests.cli.helpers import said, strict_json
 from tests.conversion.commands import CONVERSIONS, OTHERS
+from tests.helpers import copied
 from tools.regenerate import RENEW, conversion_schema
 from tools.regenerate.pages import ROOT
 
@@ -105,7 +106,7 @@ def test_date_and_versions_are_in_it() -> None:
 
 
 def test_a_card_has_the_same_version_whatever_its_line_ends_are(tmp_path: Path) -> None:
-    text = Path(pidemu.load_card("generic/series").document.path).read_bytes()
+    text = copied(Path(pidemu.load_card("generic/series").document.path)).encode()
     for name, written in (("unix", text), ("windows", text.replace(b"\n", b"\r\n"))):
         (tmp_path / "generic").mkdir(exist_ok=True)
         (tmp_path / "generic" / f"{name}.yaml").write_bytes(written)

@@ -21,6 +21,7 @@ from pidemu.conversion import comparison, verify
 from pidemu.errors import CertificateError, PidemuError
 from tests.cli.helpers import said, strict_json, with_another_filter
 from tests.conversion.commands import CONVERSIONS, OTHERS
+from tests.helpers import copied
 
 PROVOX = ("fisher/provox", "GAIN=2", "RESET=4", "RATE=0.1", "--to", "emerson/deltav", "--scan", "1,0.5")
 
@@ -196,7 +197,7 @@ def test_a_conversion_that_is_refused_or_asked_about_today_is_a_change() -> None
 
 def test_a_card_of_ones_own_is_found_in_its_folder(tmp_path: Path) -> None:
     (tmp_path / "acme").mkdir()
-    text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
+    text = copied(Path(pidemu.load_card("generic/series").document.path))
     (tmp_path / "acme" / "block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     card = pidemu.load_card("acme/block", vendors=[tmp_path])
     plain = pidemu.convert(card.settings(K=2, Ti=15, Td=5), "generic/standard").to_dict()

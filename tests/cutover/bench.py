@@ -69,6 +69,9 @@ def defined(card: Card) -> Iterator[Settings]:
     for options in option_combinations(card):
         try:
             settings = typical(card, options)
+            limits = settings.equation.integral.limits
+            wide = {} if limits is None else {limits.low: -1e6, limits.high: 1e6}  # the integral has to make the output
+            settings = settings.changed({n: x for n, x in wide.items() if isinstance(n, str) and n in settings})
             settings.algorithm()
         except SettingError:
             continue
@@ -106,7 +109,8 @@ def followed(plan: TransferPlan, s: Settings, scans: int = 3, output_limits: tup
         states = ctl.state
         states |= {"u": given["load"]} if "load" in given else {"I": given["I"]} | {n: OP for n in ("own", "inner") if n in states}
         if start == "zero":
-            states |= {"on": 1.0} | {n: 0.0 for n in ("x1", "D") if n in states}
+            history = () if a.transfer.derivative == "restarted" else ("x1", "D")  # restarted, it is the present sample
+            states |= {"on": 1.0} | {n: 0.0 for n in history if n in states}
         ctl = Controller(s, output_limits=output_limits, initial_output=OP)
         ctl.start(**states)
     return [ctl.scan(sp, PV) for _ in range(scans)]

@@ -17,6 +17,7 @@ from pidemu.fleet.loops import FleetPlan
 from pidemu.fleet.patterns import Patterns
 from pidemu.fleet.rows import RowReader
 from pidemu.fleet.table import LoopTable, read_loops
+from tests.helpers import copied
 
 HEAD = "tag,card,settings,process,scan,action,limits,setpoint,load,time"
 ROWS = (
@@ -179,7 +180,7 @@ def test_parts_of_a_table_are_its_loops(tmp_path: Path) -> None:
 def test_rows_that_go_to_another_machine_take_their_cards_along(tmp_path: Path) -> None:
     own = tmp_path / "cards" / "acme" / "pid.yaml"
     own.parent.mkdir(parents=True)
-    own.write_bytes((builtin_folder() / "generic" / "standard.yaml").read_bytes())
+    own.write_text(copied(builtin_folder() / "generic" / "standard.yaml"), encoding="utf-8")
     path = tmp_path / "loops.csv"
     rows = [f'L{i},acme/pid,K={i + 1}; Ti=9; Td=0,"gain=1,lag=9",0.5' for i in range(6)]
     path.write_text("\n".join(["tag,card,settings,process,scan", *rows]), encoding="utf-8")

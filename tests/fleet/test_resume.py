@@ -24,6 +24,7 @@ from pidemu.fleet.folder import INDEX
 from pidemu.fleet.loops import FleetPlan
 from tests.fleet.killing import parquet_of, signals_of
 from tests.fleet.support import alike
+from tests.helpers import copied
 
 STEPS: dict[str, Any] = {"setpoint": 5.0, "load": (31.0, -20.0), "time": 60.0}
 AWAY = Process(-1, [5.0])
@@ -344,7 +345,7 @@ def test_a_run_that_left_nothing_is_begun(tmp_path: Path) -> None:
 
 def test_the_key_of_a_loop_depends_on_all_that_its_numbers_do_and_on_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "generic").mkdir()
-    source = (Path(pidemu.__file__).parents[2] / "vendors" / "generic" / "standard.yaml").read_text(encoding="utf-8")
+    source = copied(Path(pidemu.__file__).parents[2] / "vendors" / "generic" / "standard.yaml")
     (tmp_path / "generic" / "standard.yaml").write_text(source.replace("limits: [0, 100]", "limits: [0, 95]"), encoding="utf-8")
     loop, plan = alike(1)[0], FleetPlan()
     others = [

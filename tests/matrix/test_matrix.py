@@ -53,7 +53,8 @@ def test_typical_settings_are_the_same_three_numbers_on_every_dial(name: str, de
     assert abs(gain) == 2
     half = {v.role: v.setting.resolution / 2 / v.value for v in settings.values() if v.setting.resolution and v.value}  # of a step
     assert abs(integral) == pytest.approx(scale / 90, rel=max(5e-4, half.get(Role.INTEGRAL, 0)))  # four digits, else the dial's
-    assert abs(time) == pytest.approx(10 * scale if derivative else 0, rel=max(5e-4, half.get(Role.DERIVATIVE, 0)))
+    acts = derivative and settings.equation.derivative.on != "none"
+    assert abs(time) == pytest.approx(10 * scale if acts else 0, rel=max(5e-4, half.get(Role.DERIVATIVE, 0)))
 
 
 def test_a_dial_with_a_resolution_is_set_to_what_it_can_show() -> None:
@@ -83,7 +84,7 @@ def test_typical_settings_make_a_controller_whose_output_falls_when_the_measurem
         pidemu.Controller(settings, 1.0, output_limits=WIDE, initial_output=50.0).run(50.0, np.repeat([50.0, pv], [5, 300]))
         for pv in (50.0, 51.0)
     )
-    assert risen[-1] < steady[-1] - 2  # by the gain at least, the integral comes on top
+    assert risen[-1] <= steady[-1] - 2  # by the gain at least, the integral comes on top where it may
 
 
 def test_a_typical_value_outside_a_range_gives_way_to_the_nearest_inside_and_is_noted(tmp_path: Path) -> None:

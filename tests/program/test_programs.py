@@ -734,7 +734,11 @@ def test_no_controller_stays_at_a_limit_once_the_error_has_turned(name: str) -> 
         parallel = variant.equation.form == "parallel"
         texts = {"gain": 3.0, "integral": "0.05 1/s" if parallel else "60 s", "derivative": 0.0}
         for dial, s in variant.equation.settings.items():
-            if s.sets in texts and is_active(variant.equation, dial, s) and not (s.sets == "derivative" and s.default is not None):
+            if "scan" in s.unit and s.sets == "integral":
+                given[dial] = 0.05  # one scan is a second here
+            elif (
+                s.sets in texts and is_active(variant.equation, dial, s) and not (s.sets == "derivative" and s.default is not None)
+            ):
                 given[dial] = "300 %" if s.sets == "gain" and s.unit == "%" else texts[s.sets]
             elif s.sets not in texts and s.default is None and is_active(variant.equation, dial, s):
                 given[dial] = working(*limits(s))

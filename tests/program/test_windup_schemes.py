@@ -21,6 +21,7 @@ from pidemu.algorithm.model import Algorithm
 from pidemu.backends.python import compiled
 from pidemu.card.load import variants
 from pidemu.card.model.base import Rule
+from pidemu.card.model.card_file import Equation, Setting
 from pidemu.card.model.integral import IntegralLimits
 from pidemu.card.model.signals import ErrorShape, SignalFilter
 from pidemu.card.windup import Scheme
@@ -382,12 +383,7 @@ def test_under_a_constant_error_the_output_of_every_card_reaches_its_limit(card_
     for variant in variants(pidemu.load_card(card_id)):
         try:
             settings = plausible(variant)
-            own_limits = {
-                n: 1000.0 if s.default is None else s.default
-                for n, s in variant.equation.settings.items()
-                if s.sets == "integral-limit"
-            }
-            settings = settings.changed(own_limits)  # which stop the integral before the output's limit, as they are meant to
+            settings = settings.changed(_out_of_the_way(variant.equation))
             a = settings.algorithm(own_units=True)
         except UndefinedError:
             continue
@@ -395,6 +391,20 @@ def test_under_a_constant_error_the_output_of_every_card_reaches_its_limit(card_
             continue
         ends = [_ends(settings, error) for error in (-7.31, 7.31)]
         assert sorted(ends) == [0.0, 100.0], variant.choice_text  # which is which, the sign of the gain decides
+
+
+def _out_of_the_way(equation: Equation) -> dict[str, float]:
+    """Return wide limits of the integral, which stop it before the output's limit as they are meant to, and no rate limit."""
+    limits = equation.integral.limits
+    low = None if limits is None else limits.low
+    wide = {n: -1000.0 if low == n else 1000.0 for n, s in equation.settings.items() if _narrow(s)}
+    rest = {n: s.default for n, s in equation.settings.items() if s.sets in ("integral-limit", "output-rate")}
+    return {n: x for n, x in rest.items() if x is not None} | wide
+
+
+def _narrow(s: Setting) -> bool:
+    """Tell whether a dial limits the integral to less than the output needs."""
+    return s.sets == "integral-limit" and (s.default is None or abs(s.default) < 1000)
 
 
 def _ends(settings: pidemu.Settings, error: float) -> float:

@@ -1,4 +1,4 @@
-"""ArduPilot's AC_PID against its documented computation; no real output is at hand."""
+"""ArduPilot's AC_PID against its documented computation; recorded outputs of the real one stand in its card."""
 
 from __future__ import annotations
 
@@ -197,6 +197,18 @@ def test_every_output_is_a_single_precision_number() -> None:
     record = signals(3).always_auto()
     found = controller(0.7, 0.3, 0.05, 20.0, (3.0, 4.0, 5.0), (-50, 50), 0.02).run(record.sp, record.pv)
     assert (found == found.astype(np.float32)).all()
+
+
+def test_a_changed_derivative_gain_acts_at_once_on_what_the_filter_holds() -> None:
+    record = signals(14).always_auto()
+    oracle, ctl = AcPid(1.0, 0.3, 0.4, 50.0, (0, 0, 0.5)), controller(1.0, 0.3, 0.4, 50.0, (0, 0, 0.5), scan=0.1)
+    first, second = record.part(0, 100), record.part(100, 200)
+    expected = outputs(oracle, first, 0.1)
+    assert close(ctl.run(first.sp, first.pv), expected, TOLERANCE, oracle.size)
+    oracle.D = F(1.2)
+    ctl.change(D=1.2)
+    expected = outputs(oracle, second, 0.1)
+    assert close(ctl.run(second.sp, second.pv), expected, TOLERANCE, oracle.size)
 
 
 def test_changed_gains_leave_the_integral_as_it_stands() -> None:

@@ -1,4 +1,4 @@
-"""OSCAT's FT_PID, FT_PIDW and FT_PIDWL against their documented computation; no real output is at hand."""
+"""OSCAT blocks against their documented computation; recorded outputs of the real ones stand in their cards."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from pidemu.report.certificate import certificate_page, write_page
 from pidemu.report.curves import bode, closed_loops, responses
 from tests.cli.helpers import said, strict_json, told
 from tests.conversion.support import continuous, outputs
-from tests.helpers import made_up_card
+from tests.helpers import copied, made_up_card
 
 DAY = date(2026, 7, 1)
 PROCESS = Process.from_lags(1.0, lags=[20, 5], delay=3)
@@ -509,7 +509,7 @@ def test_the_command_gives_what_was_asked_for_beside_the_settings(name: str) -> 
 
 def test_a_card_in_a_file_is_named_by_its_file(folder: Path) -> None:
     (folder / "acme").mkdir()
-    text = Path(pidemu.load_card("generic/series").document.path).read_text(encoding="utf-8")
+    text = copied(Path(pidemu.load_card("generic/series").document.path))
     (folder / "acme" / "own block.yaml").write_text(text.replace("vendor: Generic", "vendor: Acme"), encoding="utf-8")
     c = convert(pidemu.load_card("acme/own block.yaml").settings(SERIES), "generic/standard", digits=5)
     command = c.command

@@ -84,7 +84,13 @@ def test_a_card_without_choice_of_action_has_the_sign_of_its_gain() -> None:
     assert not feedback_is_negative(trial(settings, PROCESS, 0.5, action="direct"))
 
 
-LINEAR = [loop for loop in mixed() if not loop.settings.algorithm().beyond_the_law]
+def has_narrow_integral(loop: Loop) -> bool:
+    """Tell whether limits of the integral itself would stop what the law lets grow."""
+    limits = loop.settings.algorithm().integral.limits
+    return limits is not None and isinstance(limits.high, float) and limits.high < 1000
+
+
+LINEAR = [x for x in mixed() if not x.settings.algorithm().beyond_the_law and not has_narrow_integral(x)]
 
 
 @pytest.mark.parametrize("loop", LINEAR[::5], ids=lambda loop: loop.tag)

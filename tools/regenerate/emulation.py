@@ -1,30 +1,27 @@
-"""How each card's emulation was verified: ``docs/emulation.md``, made from the cards' evidence."""
+"""How each card's emulation was verified: ``docs/emulation.md``, made from the cards."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final
 
 from pidemu.card.library import cards, load_card
-from pidemu.card.load import EMULATION, Card, variants
-from pidemu.card.model.base import Evidence, Status
+from pidemu.card.load import Card, variants
+from pidemu.card.model.base import Evidence
+from pidemu.card.model.verification import MEANING
 
-_HOW: Final = {
-    Status.MEASURED: "against the real implementation",
-    Status.DOCUMENTED: "against the published scan equation",
-    Status.INFERRED: "against the law alone",
-    Status.ASSUMED: "only assumed",
-}
 _HEAD: Final = """\
 # How the emulations were verified
 
-Generated from the cards' evidence by `python -m tools.regenerate`; do not edit. What the words mean:
+Generated from the cards by `python -m tools.regenerate`; do not edit. `pidemu cards` shows the class of every card,
+`pidemu show` what was compared, and every certificate what its two emulations rest on.
 
-- **against the real implementation**: a test compares the card's outputs, scan by scan, with outputs of the real thing;
-- **against the published scan equation**: a test compares them with a computation of its own, written from the scan equation or the
-  program text that the maker publishes;
-- **against the law alone**: no scan equation was found. The program's linear response equals the law that the maker states; rules,
-  windup and transfers are what the card says of them;
-- **only assumed**: not even that.
+- **V1, against the real program**: a test compares the card's outputs, scan by scan, with outputs of the real thing: the
+  program runs in the test, or a trace of it was recorded (`tests/data`).
+- **V2, against the printed equations**: a test compares them with a computation of its own, written from the scan equation, the
+  program text or the differential equations that the maker publishes.
+- **V3, by its law alone**: no scan equation was found. The program's linear response equals the law that the maker states;
+  rules, windup and transfers are what the card says of them.
 
 In every case property tests hold for the card: the program's impulse response is that of its discrete law, the output stays inside
 its limits, and a transfer that is called bumpless is.
@@ -34,9 +31,11 @@ its limits, and a transfer that is called bumpless is.
 def text() -> str:
     """Return the page: one row per card, and what each card assumes of its scan-by-scan behaviour."""
     found = [load_card(name) for name in cards()]
-    rows = [(card.id, _HOW[e.status], e.at or "", e.note or "") for card in found if (e := card.data.evidence.get(EMULATION))]
-    lines = ["", "| card | verified | what | by |", "| --- | --- | --- | --- |"]
-    lines += [f"| {' | '.join(row)} |" for row in sorted(rows, key=_order)]
+    count = Counter(card.verification.class_ for card in found)
+    lines = ["", f"Of {len(found)} cards {count['V1']} are V1, {count['V2']} are V2 and {count['V3']} are V3."]
+    for name, meaning in MEANING.items():
+        lines += ["", f"## {name}: {meaning}", "", "| card | what | by |", "| --- | --- | --- |"]
+        lines += [f"| {' | '.join(_row(card))} |" for card in found if card.verification.class_ == name]
     lines += ["", "## What is assumed of the scan", ""]
     lines += [
         "Rules, windup, transfers, faults and arithmetic that no source states; `pidemu show CARD` lists all that a card assumes.",
@@ -48,8 +47,11 @@ def text() -> str:
     return "\n".join([_HEAD, *lines]) + "\n"
 
 
-def _order(row: tuple[str, str, str, str]) -> tuple[int, str]:
-    return list(_HOW.values()).index(row[1]), row[0]
+def _row(card: Card) -> tuple[str, str, str]:
+    v = card.verification
+    records = ", ".join(trace.file for trace in v.records)
+    by = "; ".join(filter(None, (v.package, records, v.test, v.note)))
+    return card.id, v.at or "", by
 
 
 def _assumed(card: Card) -> list[str]:

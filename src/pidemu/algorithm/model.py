@@ -133,6 +133,12 @@ class Algorithm(Generic[X]):
         return self.form is Form.SERIES
 
     @property
+    def has_gain_on_sum(self) -> bool:
+        """Whether one gain multiplies the sum of the terms, and with it what the integral remembers."""
+        alone = self.form is Form.PARALLEL and self.integral.holds == "e"  # the integral gain comes afterwards, and only that
+        return self.integral.holds != "ki e" and not alone and not self.velocity
+
+    @property
     def velocity(self) -> bool:
         """Whether increments are added to the last output."""
         return self.implementation == "velocity"

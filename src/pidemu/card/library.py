@@ -201,13 +201,21 @@ def _read(file: Path, card_id: str | None) -> Card | CardError:
         card = load_file(file, card_id)
     except CardError as error:
         return error
-    if _is_builtin(file):
+    if is_builtin(file):
         keep(card)
         return card
     from pidemu.checks import remembered_check  # the rules run a card, and everything that runs one depends on cards
 
     problems = remembered_check(card)
     return CardError(problems) if problems else card
+
+
+def _refuse_wrong(card: Card) -> None:
+    from pidemu.checks import remembered_check
+
+    problems = remembered_check(card)
+    if problems:
+        raise CardError(problems)
 
 
 def is_known_good(file: Path, card_id: str | None = None, shown: str | None = None) -> bool:
@@ -222,7 +230,8 @@ def is_known_good(file: Path, card_id: str | None = None, shown: str | None = No
     return store.is_checked(digest_of(read_text(path, CardError, CARD, shown=shown or str(file))), card_id or card_id_of(path))
 
 
-def _is_builtin(file: Path) -> bool:
+def is_builtin(file: Path) -> bool:
+    """Tell whether a card came with pidemu."""
     return file.resolve().is_relative_to(builtin_folder().resolve())
 
 
@@ -236,11 +245,14 @@ class CardEntry:
         The card's.
     status : dict
         How many fields of its default variant have each status.
+    verification : {"V1", "V2", "V3"}
+        How its emulation was verified.
     """
 
     id: str
     title: str
     status: Mapping[str, int]
+    verification: str
 
 
 def card_entry(file: Path, card_id: str) -> CardEntry:
@@ -257,10 +269,12 @@ def card_entry(file: Path, card_id: str) -> CardEntry:
         from pidemu.card.load import keep, load_file, status_counts
 
         card = load_file(file, card_id)
-        if _is_builtin(file):
+        if is_builtin(file):
             keep(card)
-        return CardEntry(card_id, card.title, status_counts(card))
-    return CardEntry(card_id, short["title"], short["status"])
+        elif card.verification.class_ != "V3":  # a claim, which counts where it is shown
+            _refuse_wrong(card)
+        return CardEntry(card_id, card.title, status_counts(card), card.verification.class_)
+    return CardEntry(card_id, short["title"], short["status"], short["verification"])
 
 
 def _is_file(path: Path) -> bool:

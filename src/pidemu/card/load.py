@@ -17,6 +17,7 @@ from pidemu.card import store
 from pidemu.card.document import CARD, Document, Path_, card_id_of, digest_of, wrong_id
 from pidemu.card.model.base import Evidence, Status, hyphenated
 from pidemu.card.model.card_file import CardFile, Equation, Setting
+from pidemu.card.model.verification import UNSTATED, CardVerification
 from pidemu.card.references import is_active, makes_the_law, named_settings
 from pidemu.errors import CardError, Problem, SettingError, capped, suggest
 from pidemu.excerpt import visible
@@ -25,8 +26,6 @@ from pidemu.files.reading import read_text
 if TYPE_CHECKING:
     from pidemu.settings.settings import Settings
 
-EMULATION = "emulation"
-"""Evidence key for how the emulation was verified; it leads to no field."""
 _REPLACED_WHOLE = ("filter", "windup")
 MOST_COMBINATIONS: Final = 200
 """Combinations of options, all of which are checked."""
@@ -244,6 +243,12 @@ class Card:
     def __hash__(self) -> int:
         return hash(self.id)
 
+    def __repr__(self) -> str:
+        return f"<Card {self.id}>"
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # noqa: ARG002  # IPython's and Hypothesis's way to print
+        printer.text(repr(self))
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process is sent: all but the variants, which it builds when it needs them."""
         return {**self.__dict__, "_variants": {}}
@@ -257,6 +262,11 @@ class Card:
     def title(self) -> str:
         """Vendor, product and algorithm in one line."""
         return f"{self.data.vendor} {self.data.product}: {self.data.algorithm}"
+
+    @property
+    def verification(self) -> CardVerification:
+        """How its emulation was verified."""
+        return self.data.verification or UNSTATED
 
     @property
     def options(self) -> dict[str, tuple[str, ...]]:
@@ -501,7 +511,7 @@ def compiled(card: Card) -> tuple[store.CompiledCard, dict[str, Any]]:
         Two choices, each fine by itself, do not go together.
     """
     equations = {tuple(variant.chosen.values()): variant.equation for variant in variants(card)}
-    short = {"title": card.title, "status": status_counts(card)}
+    short = {"title": card.title, "status": status_counts(card), "verification": card.verification.class_}
     return store.CompiledCard.of(card.document.value, card.data, equations), short
 
 

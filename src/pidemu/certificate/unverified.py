@@ -18,7 +18,7 @@ from pidemu.units import parse_unit, to_canonical
 _NEVER: Final = ("sets", "about", "range", "resolution", "scope")
 """What is said of a dial beside its unit, its default and what switches it off."""
 _ACTION: Final = ("action.names", "action.reverse")
-_NOT_PRINTED: Final = ("faults", "signals", "cascade", "feedforward", "transfer.changes", "transfer.preset")
+_NOT_PRINTED: Final = ("faults", "signals", "cascade", "feedforward", "transfer.changes", "transfer.preset", "transfer.zero-gain")
 """What no printed program has: inputs for them, or a change while it runs."""
 _FREQUENCIES: Final = np.geomspace(1e-6, 1e3, 37)
 _SAME: Final = 1e-12

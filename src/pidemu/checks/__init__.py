@@ -22,13 +22,13 @@ def check(card: Card) -> list[Problem]:
         The card.
     """
     from pidemu.card.load import variants
-    from pidemu.checks import equations, runs, statements  # with NumPy and all that runs a card
+    from pidemu.checks import equations, runs, statements, traces  # with NumPy and all that runs a card
 
     try:
         found = {p for rule in statements.RULES for p in rule(card)}
         found |= {p for variant in variants(card) for rule in equations.RULES for p in rule(variant)}
         if not found:  # what is wrong in itself is not computed with
-            found |= {p for run in runs.RULES for p in run(card)}
+            found |= {p for run in (*runs.RULES, traces.reject_unreproduced_traces) for p in run(card)}
     except CardError as error:  # two choices, each fine by itself, do not go together
         found = set(error.problems)
     return capped(found)
@@ -47,7 +47,7 @@ def remembered_check(card: Card) -> list[Problem]:
     from pidemu.card.load import keep
 
     found = check(card)
-    if not found:
+    if not found and not card.verification.records:  # files that may change: they are run each time
         store.keep_checked(card.digest, card.id)
         keep(card)
     return found

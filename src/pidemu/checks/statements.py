@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Final
 
 from pidemu.card.document import Path_
-from pidemu.card.load import EMULATION, Card, dotted, leaves, variants
+from pidemu.card.library import is_builtin
+from pidemu.card.load import Card, dotted, leaves, variants
 from pidemu.card.model.base import Status
 from pidemu.card.model.card_file import Equation
+from pidemu.card.model.verification import CardVerification
 from pidemu.card.references import BY_ROLE, references
 from pidemu.errors import Problem, suggest
 from pidemu.settings.ranges import RANGES
@@ -46,6 +49,8 @@ def _source_references(card: Card) -> Iterator[tuple[Path_, str]]:
     for key, evidence in card.data.evidence.items():
         if evidence.source is not None:
             yield ("evidence", key, "source"), evidence.source
+    if card.data.verification is not None and card.data.verification.source is not None:
+        yield ("verification", "source"), card.data.verification.source
     mentions = [("quirks", i, q.source) for i, q in enumerate(card.data.quirks)]
     mentions += [("examples", i, e.source) for i, e in enumerate(card.data.examples)]
     for part, i, source in mentions:
@@ -79,7 +84,11 @@ def reject_evidence_for_nothing(card: Card) -> Iterator[Problem]:
     """An evidence path leads to something in the card."""
     known = dict.fromkeys(dotted(path[:n]) for path in leaves(card.document.value) for n in range(1, len(path) + 1))
     for key in card.data.evidence:
-        if key not in known and key != EMULATION:
+        if key not in known:
+            if key == "emulation":
+                message = "how the scan program was verified stands under 'verification', not under evidence"
+                yield card.document.problem(("evidence", key), message, at_key=True)
+                continue
             yield card.document.problem(("evidence", key), f"nothing at '{key}' in this card{suggest(key, known)}", at_key=True)
 
 
@@ -127,6 +136,53 @@ def _used(equation: Equation) -> Iterator[object]:
     yield from (n for n, s in equation.settings.items() if s.sets in BY_ROLE and not off.get(s.sets, False))
 
 
+def reject_unfounded_verification(card: Card) -> Iterator[Problem]:
+    """A card says V1 or V2 of itself only with what shows it, and V3 with the reason why there is nothing better."""
+    v = card.data.verification
+    if v is None:
+        return
+    place = ("verification",)
+    if v.class_ == "V3":
+        if v.note is None:
+            yield card.document.problem(place, "'V3' needs 'note': why there is nothing better", at_key=True)
+        for name in ("records", "package", "test"):
+            if getattr(v, name):
+                yield card.document.problem((*place, name), f"'V3' is by the law alone; with '{name}' it is V1 or V2", at_key=True)
+        return
+    for name in ("source", "at"):
+        if getattr(v, name) is None:
+            yield card.document.problem(place, f"'{v.class_}' needs '{name}'", at_key=True)
+    source = card.data.sources.get(v.source or "")
+    if source is not None and source.product is not None:
+        message = f"'{v.source}' is about {source.product}, which verifies nothing of this card; write V3 and why"
+        yield card.document.problem((*place, "source"), message)
+    if v.class_ == "V2" and v.package:
+        yield card.document.problem((*place, "package"), "a package that runs is the real program: V1", at_key=True)
+    yield from _unshown(card, v)
+
+
+def _unshown(card: Card, v: CardVerification) -> Iterator[Problem]:
+    """Yield what a claim lacks that can be run: by pidemu's tests for its own cards, by the check itself for all others."""
+    place = ("verification",)
+    if is_builtin(Path(card.document.path)):
+        if v.test is None and not v.records:
+            yield card.document.problem(place, f"'{v.class_}' needs 'test' or 'records': what compares", at_key=True)
+        if v.class_ == "V1" and not (v.records or v.package):
+            message = "'V1' needs 'records' or 'package': the real program's outputs, or the program itself"
+            yield card.document.problem(place, message, at_key=True)
+        return
+    if not v.records:
+        message = (
+            f"'{v.class_}' needs 'records': recorded outputs beside the card, which the check runs it against; "
+            "without them leave 'verification' out, which is V3"
+        )
+        yield card.document.problem(place, message, at_key=True)
+        return
+    for name in ("test", "package"):
+        if getattr(v, name):
+            yield card.document.problem((*place, name), f"'{name}' is for cards that come with pidemu; remove it", at_key=True)
+
+
 def reject_ambiguous_names(card: Card) -> Iterator[Problem]:
     """Settings and options are told apart by name alone, in upper or lower case."""
     seen: dict[str, str] = {}
@@ -149,5 +205,6 @@ RULES: Final[tuple[Callable[[Card], Iterator[Problem]], ...]] = (
     reject_fields_without_evidence,
     reject_overlapping_options,
     reject_unused_settings,
+    reject_unfounded_verification,
     reject_ambiguous_names,
 )

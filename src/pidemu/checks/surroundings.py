@@ -116,7 +116,8 @@ def _wrong_state(equation: Equation) -> str | None:
     if equation.implementation == "velocity":
         return "belongs to a positional implementation; remove it"
     if equation.form == "parallel":
-        return "needs one gain for all terms, which the parallel form does not have; remove it"
+        whole = equation.integral.holds == "e"
+        return None if whole else "needs one gain for all terms, which the parallel form does not have; remove it"
     if equation.integral.windup.limits_the_term:
         return f"does not go with windup '{equation.integral.windup.scheme}', which limits the term; use 'integral.limits'"
     return None

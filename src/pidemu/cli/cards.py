@@ -17,7 +17,8 @@ from pidemu.errors import CardError
 def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
     """List the cards whose id or title holds WORD.
 
-    Beside each: how many of its statements are documented, measured, inferred or assumed.
+    Beside each: how its emulation was verified (V1 against the real program, V2 against the printed equations, V3 by its law
+    alone), and how many of its statements are documented, measured, inferred or assumed.
     """
     rows: list[CardEntry] = []
     broken = [problem.headline() for problem in unusable_files(vendors)]
@@ -32,13 +33,13 @@ def command(word: str | None, vendors: tuple[str, ...], as_json: bool) -> None:
     if not rows and not broken:
         raise click.UsageError(f"no card holds '{word}'; 'pidemu cards' lists all")
     if as_json:
-        print_json([{"card": c.id, "title": c.title, "status": dict(c.status)} for c in rows])
+        print_json([{"card": c.id, "title": c.title, "verification": c.verification, "status": dict(c.status)} for c in rows])
     else:
         table(
-            ["card", "controller", *(s.value for s in Status)],
-            [[c.id, c.title, *(str(n) for n in c.status.values())] for c in rows],
+            ["card", "controller", "verified", *(s.value for s in Status)],
+            [[c.id, c.title, c.verification, *(str(n) for n in c.status.values())] for c in rows],
             indent=0,
-            right=(2, 3, 4, 5),
+            right=(3, 4, 5, 6),
         )
     for message in broken:
         echo(f"error: {message}", err=True)

@@ -14,9 +14,10 @@ from pidemu.card.datasheet.at_limits import limit_rows
 from pidemu.card.datasheet.behaviour import mode_rows, scan_rows
 from pidemu.card.datasheet.text import equation_heading, equation_lines
 from pidemu.card.library import load_card
-from pidemu.card.load import EMULATION, Card, Variant
+from pidemu.card.load import Card, Variant
 from pidemu.card.model.base import Evidence, as_written
 from pidemu.card.model.card_file import Example, Setting
+from pidemu.card.model.verification import basis
 from pidemu.cli.common import (
     RangeArgument,
     TimeArgument,
@@ -98,6 +99,8 @@ def command(
         heading(f"\n{title}")
         _sheet(rows(variant.equation))
     _settings(variant)
+    heading("\nVerification of the scan program")
+    wrapped(basis(found.data.verification), "  ")
     _evidence(variant)
     _rest(found)
 
@@ -179,9 +182,6 @@ def _range(s: Setting) -> str:
 def _evidence(variant: Variant) -> None:
     heading("\nEvidence")
     stated = {s.key: s.evidence for s in variant.statements if s.evidence is not None}
-    emulation = variant.card.data.evidence.get(EMULATION)
-    if emulation is not None:
-        stated = {EMULATION: emulation, **stated}
     rows = [[key, e.status.value, _grounds(e)] for key, e in stated.items()]
     _sheet(rows, ["field", "status", "where it is stated, or why it is taken so"])
     assumed = variant.assumptions()
@@ -232,6 +232,7 @@ def _plain(variant: Variant) -> dict[str, object]:
     return {
         "card": card.id,
         "title": card.title,
+        "verification": card.verification.class_,
         "options": dict(variant.chosen),
         "equation": equation_lines(variant),
         "behaviour": dict([*scan_rows(q), *limit_rows(q), *mode_rows(q)]),

@@ -18,6 +18,7 @@ from pidemu.card.model.card_file import default_scan
 from pidemu.card.model.operation import Faults
 from pidemu.columns.functions import isfinite
 from pidemu.controller.faults import bad_signal, largest_signal, usable_interval
+from pidemu.controller.idle_terms import idle_dials, silenced, with_gains
 from pidemu.controller.running import Running
 from pidemu.controller.signals import FINITE, MODES, SIGNALS, Event, Mode, absent, broadcast, mode_of, modes_of, stretches
 from pidemu.errors import PidemuError, ScanError, suggest
@@ -51,6 +52,12 @@ def _number(name: str, given: object) -> float:
         return number(given)
     except ValueError as error:
         raise ScanError(f"{name}: {error}") from None
+
+
+def _gain_ratio(old: Settings, new: Settings) -> float:
+    """Return what a derivative that is remembered without its gain becomes with another one."""
+    before, now = old.algorithm(own_units=True).kd, new.algorithm(own_units=True).kd
+    return now / before if before else 1.0
 
 
 class Controller:
@@ -130,6 +137,7 @@ class Controller:
         self._bias = plausible("bias", bias, LEVEL, ScanError)
         self._initial_output = plausible("initial output", initial_output, LEVEL, ScanError)
         self._kept = 0.0  # what an integral held that was switched off while running
+        self._terms_run_on = not self._bias
         self._signals: tuple[str, ...] = ()
         self._mode: Mode = "power-up"
         self._count = 0
@@ -163,7 +171,17 @@ class Controller:
                 title=f"{settings.summary}; scan {self.interval:g} s, {self._action} acting",
             )
 
-        return Running(lambda h: settings.algorithm(own_units=True, scan=h), built, self.interval)
+        idle = idle_dials(settings) if self._terms_run_on else {}
+        whole = with_gains(settings, idle) if idle else None
+        if whole is None:
+            return Running(lambda h: settings.algorithm(own_units=True, scan=h), built, self.interval)
+        sets = frozenset(idle.values())
+        return Running(
+            lambda h: whole.algorithm(own_units=True, scan=h),
+            lambda a, h: silenced(built, a, h, sets),
+            self.interval,
+            built(settings.algorithm(own_units=True, scan=self.interval), self.interval),
+        )
 
     def _know_the_everyday_scan(self) -> None:
         """Keep in mind whether a scan without anything special goes straight to the program."""
@@ -173,6 +191,11 @@ class Controller:
     def state(self) -> dict[str, float]:
         """What the program keeps from scan to scan, by name."""
         return self._running.named()
+
+    @property
+    def lean_program(self) -> Program:
+        """The scan program without terms that run on with a gain of 0: what is printed, as nothing changes there."""
+        return self._running.plain or self.program
 
     @property
     def output(self) -> float:
@@ -245,6 +268,9 @@ class Controller:
         sp, pv, output = (_number(name, x) for name, x in (("sp", sp), ("pv", pv), ("output", output)))
         if not all(abs(x) <= self._largest for x in (sp, pv, output)):
             raise ScanError(f"setpoint {sp}, measurement {pv} and output {output} must be finite numbers of a signal's size")
+        if self._terms_run_on and self._running.plain is not None:  # nothing has run yet that could run on
+            self._terms_run_on = False
+            self._use(self.settings, self._running_with(self.settings))
         last = self._running.rest(sp, pv, output)
         self._mode, self._last = "automatic", self._running.inputs(last)
         self._know_the_everyday_scan()
@@ -292,6 +318,8 @@ class Controller:
         weights = (old.algorithm().c, new.algorithm().c)
         other_signal = weights[0] != weights[1]  # what the derivative remembers is another signal's
         kept = {n: x for n, x in before.named().items() if not (other_signal and n in ("x1", "x2", "x3"))}
+        if old.equation.derivative.holds == "d" and "D" in kept:
+            kept["D"] *= _gain_ratio(old, new)
         after.take_over(kept, last)
         if last:
             if new.algorithm().transfer.changes == "bumpless" and self._mode in ("automatic", "cascade"):
@@ -309,6 +337,8 @@ class Controller:
 
     def _constant_left_by(self, new: Settings) -> float:
         """Return what the integral leaves behind where new settings switch it off and the card keeps it."""
+        if self._terms_run_on and {"gain", "integral"} & set(idle_dials(new).values()):
+            return 0.0
         old, a = self.settings.algorithm(own_units=True), new.algorithm(own_units=True)
         if a.ki or a.velocity or a.transfer.without_integral != "kept" or a.transfer.way.loads_output:
             return 0.0

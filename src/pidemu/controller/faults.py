@@ -6,8 +6,7 @@ import sys
 from collections.abc import Mapping
 from math import isfinite
 
-from pidemu.card.load import EMULATION, Card
-from pidemu.card.model.base import Status
+from pidemu.card.load import Card
 from pidemu.card.model.operation import Faults
 from pidemu.errors import ScanError
 from pidemu.plausible import SIGNAL
@@ -21,8 +20,7 @@ def largest_signal(card: Card) -> float:
     A program whose code is known does with any finite number what its code does. Of any other controller nobody knows what it does
     with numbers that no signal reaches.
     """
-    evidence = card.data.evidence.get(EMULATION)
-    known = evidence is not None and evidence.status in (Status.MEASURED, Status.DOCUMENTED)
+    known = card.verification.class_ in ("V1", "V2")
     return sys.float_info.max if card.data.kind == "software" and known else SIGNAL
 
 

@@ -34,6 +34,8 @@ class Running:
         From an algorithm and a scan interval [s] to the program.
     interval : float
         Nominal scan interval [s].
+    plain : Program, optional
+        The program without terms whose gain is 0, where this one has them all the same.
 
     Attributes
     ----------
@@ -46,9 +48,13 @@ class Running:
     """
 
     def __init__(
-        self, algorithm: Callable[[float], Algorithm], built: Callable[[Algorithm, float], Program], interval: float
+        self,
+        algorithm: Callable[[float], Algorithm],
+        built: Callable[[Algorithm, float], Program],
+        interval: float,
+        plain: Program | None = None,
     ) -> None:
-        self.interval = interval
+        self.interval, self.plain = interval, plain
         self.program = built(algorithm(interval), interval)
         self.compiled: Compiled = compiled(self.program)
         self.state: list[float] = list(self.compiled.initial)

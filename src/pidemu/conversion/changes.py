@@ -53,6 +53,7 @@ def changes(signed: Signed, c: Conversion) -> Iterator[Change]:
             yield from compare.of(kind, "", said[name], now[name])
     for name, kind in _OTHERS.items():
         yield from compare.of(kind, "", said[name], now[name])
+    yield from compare.of("verification", "", said["verification"], now["verification"])
     yield from compare.of("figure", "", signed.certificate, now["certificate"])
 
 

@@ -29,9 +29,9 @@ class Change:
     kind : str
         What it is: ``conversion``, ``card``, ``dial``, ``option``, ``range``, these of the old controller with ``before``,
         ``verdict``, ``condition``, ``action``, ``bench check``, ``cut-over plan``, ``figure``, ``scan interval``, ``gain factor``,
-        ``process``, ``setpoint filter`` or, by the same pidemu with the same cards, what is worded or stands beside the answer:
-        ``sentence``, ``at the loop``, ``warnings``, ``match``, ``chosen``, ``command``, ``notes``, ``assumptions``, ``refusal``,
-        ``runner-up``, ``other settings``, ``ranking``, ``textbook rule``.
+        ``process``, ``setpoint filter``, ``verification`` or, by the same pidemu with the same cards, what is worded or stands
+        beside the answer: ``sentence``, ``at the loop``, ``warnings``, ``match``, ``chosen``, ``command``, ``notes``,
+        ``assumptions``, ``refusal``, ``runner-up``, ``other settings``, ``ranking``, ``textbook rule``.
     name : str
         Which one; empty where there is but one.
     before, after : str

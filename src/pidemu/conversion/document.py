@@ -36,6 +36,7 @@ def provenance(c: Conversion, date: datetime.date | None = None) -> dict[str, An
         "pidemu": pidemu.__version__,
         "date": (date or datetime.date.today()).isoformat(),
         "cards": card_versions(c),
+        "verification": {s.card.id: s.card.verification.class_ for s in (c.source, c.settings)},
         "request": {"from": source_as_given(c.source), "to": c.settings.card.id, **c.request.to_dict()},
     }
 

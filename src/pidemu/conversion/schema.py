@@ -191,6 +191,7 @@ class ConversionPart(DocumentPart):
     pidemu: Name = Field(description="Version of pidemu.")
     date: Day = Field(description="Date of the certificate.")
     cards: dict[Name, Sha256] = Field(description="SHA-256 of the file of each card, by id.")
+    verification: dict[Name, Literal["V1", "V2", "V3"]] = Field(description="How each card's emulation was verified, by id.")
     request: Asked
     source: Side = Field(alias="from")
     to: TargetSide

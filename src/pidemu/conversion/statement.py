@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Final
 
+from pidemu.card.model.verification import short_basis
 from pidemu.certificate.figures import decibels, degrees, emulation_line, kick_line, other_units, percent, unit_of
 from pidemu.certificate.models import EXACT
 from pidemu.certificate.unverified import facts, unverified_law, unverified_program
@@ -147,7 +148,14 @@ def condition_line(condition: Condition) -> str:
 
 def figure_lines(c: Conversion) -> list[str]:
     """Return what stands below the table of figures."""
-    return [line for line in (emulation_line(c.certificate), kick_line(c.certificate), _textbook_line(c)) if line]
+    lines = (emulation_line(c.certificate), basis_line(c), kick_line(c.certificate), _textbook_line(c))
+    return [line for line in lines if line]
+
+
+def basis_line(c: Conversion) -> str:
+    """Return what running the two rests on: how the emulation of each was verified."""
+    sides = {s.card.id: short_basis(s.card.data.verification) for s in (c.source, c.settings)}
+    return f"what emulations rest on: {'; '.join(f'{card} {words}' for card, words in sides.items())}"
 
 
 def proof_lines(c: Conversion) -> tuple[str, ...]:

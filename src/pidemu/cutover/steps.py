@@ -107,6 +107,8 @@ def _integral(new: Takeover, integral: float, cut: Cut) -> CutoverStep:
     held = {"ki e": "", "e/Ti": ", divided by the gain", "e": ", divided by the gain and times the integral time"}[
         new.a.integral.holds
     ]
+    if new.a.integral.holds == "e" and not new.a.has_gain_on_sum:
+        held = ", divided by the integral gain"
     after = "once it is on, and before its first scan, " if new.a.transfer.way.clears else ""
     return CutoverStep(
         f"{after}set its integral to {integral:.6g} {new.unit}: the output of {new.op:.6g} {own} less the proportional term of "

@@ -136,6 +136,8 @@ def factors(a: Algorithm, ctl: Controller) -> tuple[float, float]:
     if a.integral.holds == "ki e":
         return 1.0, 1.0
     numbers = dict(zip((q.name for q in ctl.program.coefficients), ctl.program.values, strict=True))
+    if not a.has_gain_on_sum:
+        return 1.0, 1 / numbers["ki"] if a.ki else 1.0
     return numbers["kp"], numbers.get("Ti", 1.0) if a.integral.holds == "e" else 1.0
 
 

@@ -87,7 +87,7 @@ def code(
         check_name(name, lang)
     controller = Controller(settings, scan, action, output_limits)
     controller.listen(*signals)
-    program, test = controller.program, None
+    program, test = controller.lean_program, None
     if self_test:
         from pidemu.vector_sets.block_test import block_test
         from pidemu.vector_sets.vectors import vectors

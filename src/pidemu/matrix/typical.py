@@ -92,7 +92,7 @@ def held_dials(card: Card) -> dict[str, float]:
     """
     variant = card.variant()
     return {
-        name: _sensible(setting, variant.equation)
+        name: _sensible(name, setting, variant.equation)
         for name, setting in _active(variant)
         if setting.default is None
         and Role(setting.sets) is not Role.MULTIPLIER
@@ -114,7 +114,7 @@ def _dials(variant: Variant, derivative: bool) -> tuple[dict[str, float], list[s
         if role in terms:
             value = _term(role, terms[role], setting, variant.equation)
         elif setting.default is None:
-            value = _sensible(setting, variant.equation)
+            value = _sensible(name, setting, variant.equation)
         else:
             continue
         low, high = limits(setting)
@@ -142,14 +142,16 @@ def _term(role: Role, canonical: float, setting: Setting, equation: Equation) ->
     return value if setting.resolution is None else _rounded(round(value / setting.resolution) * setting.resolution)
 
 
-def _sensible(setting: Setting, equation: Equation) -> float:
+def _sensible(name: str, setting: Setting, equation: Equation) -> float:
     """Return a sensible value for a dial without default, inside its range."""
     role, unit = Role(setting.sets), parse_unit(setting.unit)
     low, high = limits(setting)
     share_of_a_time = role is Role.TRACKING_TIME and unit.dimension is Dimension.RATIO
     if role not in _OTHERS or share_of_a_time:
         return working(low, high)
-    return min(max(_rounded(from_canonical(role, _OTHERS[role], unit, _spans(equation))), low), high)
+    own = equation.integral.limits
+    below = -1.0 if own is not None and own.low == name else 1.0
+    return min(max(below * _rounded(from_canonical(role, _OTHERS[role], unit, _spans(equation))), low), high)
 
 
 def _spans(equation: Equation) -> Spans:

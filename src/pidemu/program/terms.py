@@ -75,7 +75,7 @@ def terms(b: Builder, a: Algorithm, h: float, limits: tuple[float, float], initi
     on = b.state("on", "automatic in the last scan", "-") > 0.0
     fresh = equal(Name("on"), 0.0) if a.transfer.derivative == "restarted" else b.fresh
     s = _signals(b, a, h, fresh)
-    outside = a.integral.holds == "ki e" or a.velocity
+    outside = not a.has_gain_on_sum
     if a.kp:
         with_gain = outside and not a.velocity  # increments are those of the signal, so that a changed gain acts on them alone
         P: Expr = b.let("P", _proportional(b, a, s, with_gain, fresh), "proportional term" if with_gain else "signal of P")

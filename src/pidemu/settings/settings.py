@@ -168,6 +168,9 @@ class Settings(Mapping[str, Value]):
     def __repr__(self) -> str:
         return f"<Settings {self.summary}>"
 
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # noqa: ARG002  # IPython's and Hypothesis's way to print
+        printer.text(repr(self))
+
     @property
     def summary(self) -> str:
         """Card, dials and options in one line."""

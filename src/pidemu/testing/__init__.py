@@ -1,4 +1,4 @@
-"""Test your own controller against a card: strategies for Hypothesis, comparisons that find the shortest difference, a pytest plugin.
+"""Test your own controller against a card: strategies for Hypothesis, comparisons that shrink a difference, a pytest plugin.
 
 Names are imported when first used; the strategies and the comparisons need Hypothesis (``pip install 'pidemu[testing]'``).
 

@@ -24,7 +24,7 @@ class AdapterError(PidemuError):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class MadeFor:
     """What a controller is made for.
 
     Attributes
@@ -62,20 +62,20 @@ def over_arrays(function: Callable[..., Iterable[Any]]) -> OverArrays:
     ----------
     function : callable
         Called with those of ``settings``, ``scan``, ``limits``, ``action``, ``initial_output``, and of the lists ``sp``, ``pv``,
-        ``auto`` and ``manual`` (a float for each scan; ``None`` where the operator sets nothing) that it names; it returns an output
-        for each scan. It is not given changes of settings.
+        ``auto`` and ``manual`` (a float for each scan; ``None`` where the operator sets nothing) that it names; returns
+        an output for each scan. It is not given changes of settings.
     """
     return OverArrays(function)
 
 
-def outputs_of(mine: Any, asked: Asked, record: SignalRecord) -> list[float]:
+def outputs_of(mine: Any, asked: MadeFor, record: SignalRecord) -> list[float]:
     """Return what a user's controller makes of a record, made anew.
 
     Parameters
     ----------
     mine : callable or OverArrays
         What makes the controller: see `pidemu.testing.assert_equals`.
-    asked : Asked
+    asked : MadeFor
         What it is made for.
     record : SignalRecord
         The scans.
@@ -90,7 +90,9 @@ def outputs_of(mine: Any, asked: Asked, record: SignalRecord) -> list[float]:
             raise AdapterError("a function over arrays is not told of changed settings; leave 'changes' out of the modes")
         found = list(_called(mine.function, _about(asked) | {name: getattr(record, name) for name in _SIGNALS}))
         if len(found) != len(record.scans):
-            raise AdapterError(f"{_name(mine)} returned {len(found)} outputs for {len(record.scans)} scans; return one for each scan")
+            raise AdapterError(
+                f"{_name(mine)} returned {len(found)} outputs for {len(record.scans)} scans; return one for each scan"
+            )
         return [_output(mine, u, n) for n, u in enumerate(found)]
     controller = _made(mine, asked)
     scan = _method(mine, controller)
@@ -107,14 +109,16 @@ def name_of(mine: Any) -> str:
     return _name(mine)
 
 
-def _about(asked: Asked) -> dict[str, Any]:
+def _about(asked: MadeFor) -> dict[str, Any]:
     return {name: getattr(asked, name) for name in _ABOUT}
 
 
-def _made(mine: Any, asked: Asked) -> Any:
+def _made(mine: Any, asked: MadeFor) -> Any:
     """Make the controller: with what its maker names, or with the settings where it has one other argument."""
     if not callable(mine):
-        raise AdapterError(f"{shown(mine)} makes no controllers; give a class, or a function that takes the settings and returns one")
+        raise AdapterError(
+            f"{shown(mine)} makes no controllers; give a class, or a function that takes the settings and returns one"
+        )
     names = _parameters(mine)
     if {"sp", "pv"} <= set(names):
         raise AdapterError(
@@ -151,7 +155,9 @@ def _scanned(scan: Callable[..., Any], signals: ScanSignals) -> Any:
 def _change(mine: Any, controller: Any, settings: Settings) -> None:
     change = getattr(controller, "change", None)
     if not callable(change):
-        raise AdapterError(f"what {_name(mine)} made has no method change(settings); give it one, or leave 'changes' out of the modes")
+        raise AdapterError(
+            f"what {_name(mine)} made has no method change(settings); give it one, or leave 'changes' out of the modes"
+        )
     change(settings)
 
 

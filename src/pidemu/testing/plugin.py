@@ -62,18 +62,20 @@ def pidemu_equals(request: pytest.FixtureRequest) -> Callable[..., None]:
 @pytest.fixture
 def pidemu_settings(request: pytest.FixtureRequest) -> Settings:
     """The settings that the marker gives."""
-    from pidemu import Settings
+    from pidemu.settings.settings import Settings
 
     card, _ = _said(request)
     if not isinstance(card, Settings):
-        raise pytest.UsageError(f'{request.node.nodeid}: the marker gives no settings; write @pytest.mark.pidemu("{card}", NAME=VALUE)')
+        raise pytest.UsageError(
+            f'{request.node.nodeid}: the marker gives no settings; write @pytest.mark.pidemu("{card}", NAME=VALUE)'
+        )
     return card
 
 
 @pytest.fixture
 def pidemu_controller(request: pytest.FixtureRequest, pidemu_settings: Settings) -> Controller:
     """The emulated controller of the marker, before its first scan."""
-    from pidemu import Controller
+    from pidemu.controller.controller import Controller
 
     _, asked = _said(request)
     given = {"scan": "scan", "action": "action", "output_limits": "limits", "initial_output": "initial_output"}
@@ -82,12 +84,14 @@ def pidemu_controller(request: pytest.FixtureRequest, pidemu_settings: Settings)
 
 def _said(request: pytest.FixtureRequest) -> tuple[Any, dict[str, Any]]:
     """Return the marker's card, or settings where it gives any, and what else it says."""
-    from pidemu import load_card
+    from pidemu.card.library import load_card
     from pidemu.testing import assert_equals
 
     marker = request.node.get_closest_marker("pidemu")
     if marker is None or len(marker.args) != 1:
-        raise pytest.UsageError(f'{request.node.nodeid}: name the card, such as @pytest.mark.pidemu("emerson/deltav", GAIN=2, scan=0.5)')
+        raise pytest.UsageError(
+            f'{request.node.nodeid}: name the card, such as @pytest.mark.pidemu("emerson/deltav", GAIN=2, scan=0.5)'
+        )
     keywords = {p.name for p in inspect.signature(assert_equals).parameters.values() if p.kind is p.KEYWORD_ONLY}
     asked = {name: x for name, x in marker.kwargs.items() if name in keywords}
     dials = {name: x for name, x in marker.kwargs.items() if name not in keywords}

@@ -16,7 +16,7 @@ from pidemu.controller.controller import Controller
 from pidemu.formatting import number
 from pidemu.program.ir import Assign, Program
 from pidemu.settings.settings import Settings
-from pidemu.testing.adapter import Asked, differs
+from pidemu.testing.adapter import MadeFor, differs
 from pidemu.testing.record import SignalRecord
 
 _MOST: Final = 12
@@ -27,7 +27,7 @@ _DULL: Final = ("kept for the next scan", "no denormal numbers", "mode, kept", "
 
 def report(
     settings: Settings | None,
-    asked: Asked | None,
+    asked: MadeFor | None,
     record: SignalRecord,
     outputs: tuple[Sequence[float], Sequence[float]],
     names: tuple[str, str],
@@ -40,7 +40,7 @@ def report(
     ----------
     settings : Settings or None
         The settings of both.
-    asked : Asked or None
+    asked : MadeFor or None
         How the first was made where it is pidemu's, so that its terms are told; else ``None``.
     record : SignalRecord
         The scans.
@@ -58,7 +58,7 @@ def report(
 
 def _lines(
     settings: Settings | None,
-    asked: Asked | None,
+    asked: MadeFor | None,
     record: SignalRecord,
     outputs: tuple[Sequence[float], Sequence[float]],
     names: tuple[str, str],
@@ -99,7 +99,7 @@ def _lines(
         yield from _table([(f"{name}  {text}", [_digits(x) for x in values][shown]) for name, text, values in terms])
 
 
-def _terms(settings: Settings, asked: Asked, record: SignalRecord) -> Iterator[tuple[str, str, list[float]]]:
+def _terms(settings: Settings, asked: MadeFor, record: SignalRecord) -> Iterator[tuple[str, str, list[float]]]:
     """Yield what the program assigns in each scan: name, text and values."""
     program = Controller(settings, asked.scan, asked.action, asked.limits, initial_output=asked.initial_output).program
     told = _told(program)

@@ -89,16 +89,14 @@ def settings(card: str | Card, /, **fixed: object) -> st.SearchStrategy[Settings
     return dials_of(found, fixed).map(found.settings)
 
 
-@st.composite
 def records(
-    draw: st.DrawFn,
     scans: tuple[int, int] = (1, 60),
     *,
     pv_range: tuple[float, float] = (0.0, 100.0),
     output_range: tuple[float, float] = (0.0, 100.0),
     modes: Sequence[TestedMode] = ("automatic",),
     changes: st.SearchStrategy[Settings] | None = None,
-) -> SignalRecord:
+) -> st.SearchStrategy[SignalRecord]:
     """A record of setpoint, measurement and mode; shrinks to few scans that stay in the middle of the range.
 
     Parameters
@@ -112,14 +110,22 @@ def records(
     changes : strategy, optional
         Where the changed settings come from.
     """
-    (low, high), (bottom, top) = pv_range, output_range
     step = st.none() | st.integers(-_STEPS, _STEPS)
-    rows = draw(st.lists(st.tuples(step, step, _modes(modes), _changed(modes, changes)), min_size=scans[0], max_size=scans[1]))
-    found, sp, pv = [], (low + high) / 2, (low + high) / 2
+    row = st.tuples(step, step, _modes(modes), _changed(modes, changes))
+    return st.lists(row, min_size=scans[0], max_size=scans[1]).map(lambda rows: _record(rows, pv_range, output_range))
+
+
+def _record(rows: Sequence[tuple[Any, ...]], pv_range: tuple[float, float], output_range: tuple[float, float]) -> SignalRecord:
+    """Return the record of steps away from the middle of the ranges; ``None`` leaves a signal where it is."""
+
+    def level(ends: tuple[float, float], steps: int) -> float:
+        return (ends[0] + ends[1]) / 2 + steps * (ends[1] - ends[0]) / 2 / _STEPS
+
+    found, sp, pv = [], level(pv_range, 0), level(pv_range, 0)
     for to_sp, to_pv, mode, new in rows:
-        sp = sp if to_sp is None else (low + high) / 2 + to_sp * (high - low) / 2 / _STEPS
-        pv = pv if to_pv is None else (low + high) / 2 + to_pv * (high - low) / 2 / _STEPS
-        by_hand = None if mode in (None, "held") else (bottom + top) / 2 + int(mode) * (top - bottom) / 2 / _STEPS
+        sp = sp if to_sp is None else level(pv_range, to_sp)
+        pv = pv if to_pv is None else level(pv_range, to_pv)
+        by_hand = None if mode in (None, "held") else level(output_range, mode)
         found.append(ScanSignals(sp, pv, mode is None, by_hand, new))
     return SignalRecord(tuple(found))
 
@@ -135,10 +141,13 @@ def _changed(modes: Sequence[TestedMode], changes: st.SearchStrategy[Settings] |
     return st.integers(0, 7).flatmap(lambda n: changes if n == 7 else st.none())
 
 
-@st.composite
+_SIZES: Final = st.floats(0.02, 5)
+_PAIRS: Final = st.builds(lambda size, z: size * complex(-z, math.sqrt(1 - z * z)), _SIZES, st.floats(0.05, 0.95))
+
+
 def processes(
-    draw: st.DrawFn, *, delay: bool = False, integrating: bool = True, unstable: bool = False, gains: Sequence[int] = (1, -1)
-) -> Process:
+    *, delay: bool = False, integrating: bool = True, unstable: bool = False, gains: Sequence[int] = (1, -1)
+) -> st.SearchStrategy[Process]:
     """Processes of up to four poles, with up to one complex pair.
 
     Parameters
@@ -150,18 +159,28 @@ def processes(
     gains : sequence of int
         Signs that the gain may have.
     """
-    upper = draw(st.lists(_PAIRS, max_size=1))
     left = _SIZES.map(lambda x: -x)
-    real = draw(st.lists(left | st.just(0.0) if integrating else left, min_size=1, max_size=2))
-    zeros = draw(st.lists(left | _SIZES, max_size=len(real) - 1))
-    right = [draw(st.floats(0.05, 1))] if unstable and draw(st.integers(0, 2)) == 0 else []
-    poles = [*real, *right, *(x for p in upper for x in (p, p.conjugate()))]
-    waits = draw(st.just(0.0) | st.floats(0.01, 20)) if delay else 0.0
-    return Process(draw(_SIZES) * draw(st.sampled_from(tuple(gains))), poles, zeros, waits)
+    real = st.lists(left | st.just(0.0) if integrating else left, min_size=1, max_size=2)
+    right: st.SearchStrategy[list[float]] = (
+        st.just([]) | st.just([]) | st.lists(st.floats(0.05, 1), min_size=1, max_size=1) if unstable else st.just([])
+    )
+    waits = st.just(0.0) | st.floats(0.01, 20) if delay else st.just(0.0)
+    return _processes(real, left | _SIZES, right, waits, st.sampled_from(tuple(gains)))
 
 
-_SIZES: Final = st.floats(0.02, 5)
-_PAIRS: Final = st.builds(lambda size, z: size * complex(-z, math.sqrt(1 - z * z)), _SIZES, st.floats(0.05, 0.95))
+@st.composite
+def _processes(
+    draw: st.DrawFn,
+    real: st.SearchStrategy[list[float]],
+    roots: st.SearchStrategy[float],
+    right: st.SearchStrategy[list[float]],
+    waits: st.SearchStrategy[float],
+    signs: st.SearchStrategy[int],
+) -> Process:
+    upper, found = draw(st.lists(_PAIRS, max_size=1)), draw(real)
+    zeros = draw(st.lists(roots, max_size=len(found) - 1))
+    poles = [*found, *draw(right), *(x for p in upper for x in (p, p.conjugate()))]
+    return Process(draw(_SIZES) * draw(signs), poles, zeros, draw(waits))
 
 
 def option_combinations(card: Card, fixed: Mapping[str, object] | None = None) -> list[dict[str, str]]:
@@ -199,7 +218,11 @@ def dials_of(draw: st.DrawFn, card: Card, fixed: Mapping[str, object] | None = N
     equation = card.variant(options).equation
     given: dict[str, object] = {n: c for n, c in options.items() if n.casefold() not in names} | chosen
     for name, setting in equation.settings.items():
-        if name.casefold() in names or not is_active(equation, name, setting) or (setting.default is not None and draw(st.integers(0, 4)) == 0):
+        if (
+            name.casefold() in names
+            or not is_active(equation, name, setting)
+            or (setting.default is not None and draw(st.integers(0, 4)) == 0)
+        ):
             continue
         given[name] = draw(dial_values(setting))
     refused = False

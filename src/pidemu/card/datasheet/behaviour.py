@@ -84,7 +84,8 @@ def _derivative(d: Derivative[Reference]) -> str:
         return "backward difference, unfiltered"
     if d.rule is Rule.LAGGED_DIFFERENCE:
         return "difference of the signal and its own lag; without filter time none"
-    return f"{d.rule.value}, filtered" + ("; unfiltered where Tf is 0" if _may_be_off(d) else "")
+    own = "; the gain comes after the filter" if d.holds == "d" else ""
+    return f"{d.rule.value}, filtered" + ("; unfiltered where Tf is 0" if _may_be_off(d) else "") + own
 
 
 def _may_be_off(d: Derivative[Reference]) -> bool:
@@ -130,11 +131,12 @@ def _changes(q: Equation) -> str:
         return "a changed gain moves P and D"
     if q.transfer.changes == "bumpless":
         return "do not move the output: the integral takes up what P becomes less"
+    idle = "; with a gain of 0 its sum and history go on unseen" if q.transfer.zero_gain == "runs-on" else ""
     return {
         "ki e": "leave the integral as it is; a changed gain moves P and D",
         "e/Ti": "leave the integral of e/Ti as it is; a changed gain moves the whole sum",
         "e": "leave the integral of e as it is; a changed gain or integral time moves the whole sum",
-    }[q.integral.holds]
+    }[q.integral.holds] + idle
 
 
 def _action(q: Equation) -> str:

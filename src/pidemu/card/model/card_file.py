@@ -16,6 +16,7 @@ from pidemu.card.model.marks import PerScan
 from pidemu.card.model.operation import Action, Arithmetic, Faults, Output, Scan
 from pidemu.card.model.signals import ErrorShape, Measurement, Setpoint
 from pidemu.card.model.terms import Cascade, Derivative, Feedforward, Proportional
+from pidemu.card.model.verification import CardVerification
 from pidemu.card.transfer import Transfer
 from pidemu.part import part
 from pidemu.units import Role, parse_quantity, to_canonical
@@ -175,10 +176,15 @@ class Equation(Part):
     ]
 
 
+def interval_of(text: str) -> float:
+    """Return an interval that a card states, such as ``500 ms`` [s]."""
+    number, unit = parse_quantity(text)
+    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
+
+
 def default_scan(equation: Equation) -> float:
     """Return the card's scan interval [s]."""
-    number, unit = parse_quantity(equation.scan.default)
-    return number if unit is None else to_canonical(Role.FILTER_TIME, number, unit)
+    return interval_of(equation.scan.default)
 
 
 @part(frozen=True, slots=True, kw_only=True)
@@ -209,6 +215,9 @@ class CardFile(Equation):
             "`options.FORM.choices.Series`, covers everything below it; the longest path wins."
         ),
     ]
+    verification: Annotated[
+        CardVerification | None, means("How the scan program was verified; a card that does not say counts as `V3`.")
+    ] = None
     quirks: Annotated[list[Quirk], Only(max_length=100), means("Facts worth knowing that the equation does not show.")] = field(
         default_factory=list
     )

@@ -44,8 +44,8 @@ class Integral(Part, Generic[R]):
         Literal["ki e", "e/Ti", "e"],
         means(
             "What the integral remembers. The sum of `ki e`: a changed gain or integral time counts for what is still to "
-            "come. The sum of `e/Ti`, multiplied by the gain afterwards, or of `e`, multiplied by gain and 1/Ti afterwards: a "
-            "change counts for the whole sum, and bumps (specs/equations.md, section 6)."
+            "come. The sum of `e/Ti`, multiplied by the gain afterwards, or of `e`, multiplied by gain and 1/Ti afterwards (in the "
+            "parallel form by the integral gain): a change counts for the whole sum, and bumps (specs/equations.md, section 6)."
         ),
         PerScan(),
     ] = "ki e"
@@ -53,7 +53,7 @@ class Integral(Part, Generic[R]):
         IntegralLimits[R] | None,
         means(
             "Limits of what the integral remembers, besides what `windup` does: in output units for `ki e`, "
-            "otherwise before the gain."
+            "otherwise before the gain, for `e` in error times seconds."
         ),
         PerScan(),
         Beyond(None),

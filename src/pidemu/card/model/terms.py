@@ -98,6 +98,14 @@ class Derivative(Part, Generic[R]):
         AtRest("sample"),
     ] = "sample"
     filter: Annotated[Filter[R] | None, means("The filter; none if absent.")] = None
+    holds: Annotated[
+        Literal["kd d", "d"],
+        means(
+            "What a filtered derivative remembers, which shows when its gain is changed while running: `kd d`, the term, or `d`, "
+            "the derivative without its gain, on which a changed gain acts at once."
+        ),
+        PerScan(),
+    ] = "kd d"
 
 
 @part(frozen=True, slots=True, kw_only=True)

@@ -103,6 +103,14 @@ class Transfer(Part):
             "integral is set so that the output does not move."
         ),
     ] = "as-held"
+    zero_gain: Annotated[
+        Literal["removes", "runs-on"],
+        means(
+            "What a gain of 0 does to its term, which shows when the gain comes back while running. `removes`: the term starts at "
+            "rest, from the last signals, and an integral where the output stays. `runs-on`: sums and histories have gone on "
+            "unseen, as they do in a program that computes every term every time."
+        ),
+    ] = "removes"
 
     @property
     def way(self) -> type[Start]:

@@ -16,5 +16,5 @@ class Hooks(StartHooks):
 
     def in_manual(self, x: Positional, manual: Expr) -> None:
         """Set the integral to what the operator's output leaves for it."""
-        needed = x.left_for_integral(manual, x.t.D)
+        needed = x.left_by_hand(manual)
         x.b.let("I", select(x.b.automatic, x.state, needed), "in manual the integral tracks the output (section 6)")

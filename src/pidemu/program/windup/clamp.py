@@ -14,4 +14,7 @@ class Hooks(WindupHooks[WindupClamp[float]]):
     def after_growth(self, x: Positional) -> None:
         """Keep the sum within the output limits."""
         text = f"{self.scheme.scheme}: the sum within the output limits (section 5)"
-        x.b.let("I", blocks.limited(x.state, x.t.low, x.t.high), text)
+        low, high = (x.held.state(limit) for limit in (x.t.low, x.t.high))
+        if x.held.factor is not None and x.a.ki < 0:
+            low, high = high, low
+        x.b.let("I", blocks.limited(x.state, low, high), text)

@@ -1,0 +1,1 @@
+"""The public testing room, used as a stranger would."""
