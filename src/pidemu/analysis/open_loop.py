@@ -31,7 +31,7 @@ _LIGHT: Final = 0.5
 _ACROSS: Final = np.linspace(-4.0, 4.0, 81)
 """Where a peak is looked at, in its half width at half its power."""
 _NEAR: Final = 0.05
-"""The logarithm of a loop gain that may come to 1 between two frequencies."""
+"""So near 1 is a loop gain that may come to 1 between two frequencies."""
 _TOUCHES: Final = 4
 """How often the top of such a peak is sought by a parabola: each time the distance is squared, roughly."""
 _DAMPING: Final = 1e-6
@@ -191,12 +191,16 @@ def _resonances(loop: OpenLoop, low: float, high: float) -> Floats:
 
 def _touches(w: Floats, sizes: Floats) -> Floats:
     """Return where a peak just below a loop gain of 1, or a dip just above it, has its top between the frequencies [rad/s]."""
+    around = np.abs(sizes[1:-1] - 1) < _NEAR
+    around &= (sizes[1:-1] > sizes[:-2]) == (sizes[1:-1] > sizes[2:])
+    if not around.any():
+        return w[:0]
     with np.errstate(divide="ignore", invalid="ignore"):
         x, y = np.log(w), np.log(sizes)
         a, b = (y[1:-1] - y[:-2]) / (x[1:-1] - x[:-2]), (y[2:] - y[1:-1]) / (x[2:] - x[1:-1])
         bend = (b - a) / (x[2:] - x[:-2])
         top = (x[1:-1] + x[:-2]) / 2 - a / (2 * bend)
-        near = (np.abs(y[1:-1]) < _NEAR) & (a * b < 0) & (y[1:-1] * bend > 0) & (x[:-2] < top) & (top < x[2:])
+        near = around & (a * b < 0) & (y[1:-1] * bend > 0) & (x[:-2] < top) & (top < x[2:])
     return np.setdiff1d(np.exp(top[near]), w)
 
 
@@ -224,6 +228,8 @@ def picture_of(loop: OpenLoop) -> OpenLoopResponse:
         w, values = np.insert(w, rough + 1, between), np.insert(values, rough + 1, loop(between))
     for _ in range(_TOUCHES):
         between = _touches(w, np.abs(values))
+        if not between.size:
+            break
         w, values = np.concatenate([w, between]), np.concatenate([values, loop(between)])
         order = np.argsort(w)
         w, values = w[order], values[order]
