@@ -183,6 +183,14 @@ def test_scan_by_scan_is_exact_to_the_span_or_to_what_the_output_moves_over() ->
     assert not one(0.9e-5, 1.1e-5, 10_000).is_exact_on_measurement
 
 
+def test_intervals_too_far_apart_are_not_run_against_each_other_and_the_reason_is_told() -> None:
+    """71 s and 8 ms: 177,500 scans in the time in which the old controller moves; a run took four seconds."""
+    with pytest.raises(ScanError, match=r"does 177,500 scans in the 1420 s in which the old one moves, too many to run both"):
+        emulated(
+            settings("generic/series", K=96, Ti=562.2, Td=0.0761), settings("king/velocity", Kc=96, Ti=562, Td=0), (71.0, 0.008)
+        )
+
+
 FLOAT32: dict[str, dict[str, object]] = {
     "oscat/ft-pid": {"KP": 2 + 1 / 30, "TN": 30.5, "TV": 0},  # by the trapezoidal rule the same: kp more by ki h/2
     "iec/61131-3-pid": {"KP": -2, "TR": 30, "TD": 0},

@@ -22,8 +22,8 @@ _OUTPUTS: Final = ("-o", "--table", "--parquet", "--plot", "--html", "--csv", "-
 """Options with the name of a file that a command writes."""
 _LINES: Final = re.compile("[\u2028\u2029]")
 """Ends of lines to some programs; within JSON they are letters."""
-_NAN: Final = re.compile(r"\bnan\b")
-"""As a number is printed; in sentences it is NaN."""
+_NAN: Final = re.compile(r"(?<!')\bnan\b(?!')")
+"""As a number is printed; in sentences it is NaN, and in quotation marks what was given."""
 _NOT_FINITE: Final = re.compile(r"nan|inf|\d[eE][+-]?\d\d|\d{20}|\d_\d")
 """Marks of an input that may have an answer with NaN."""
 

@@ -16,7 +16,7 @@ from pidemu.controller.bench import Bench
 from pidemu.errors import ScanError
 from pidemu.records.files import Record
 from pidemu.records.sampling import record_from_percent
-from pidemu.records.standard import REST, Segment, StandardRecord, scale_of, standard_record
+from pidemu.records.standard import MOST_SCANS, REST, Segment, StandardRecord, scale_of, standard_record
 from pidemu.settings.action import Action, acting_alike
 from pidemu.settings.settings import Settings
 
@@ -101,9 +101,17 @@ def emulated(
     Raises
     ------
     ScanError
-        A controller cannot be run at its interval, or scans so slowly that it would not scan once.
+        A controller cannot be run at its interval, scans so slowly that it would not scan once, or so much faster than the other
+        one that the comparison would take seconds.
     """
     record = record_for(source, scans[0])
+    many = record.characteristic_time / scans[1]
+    if many > MOST_SCANS:
+        raise ScanError(
+            f"the new controller, which scans every {scans[1]:g} s, does {many:,.0f} scans in the "
+            f"{record.characteristic_time:.6g} s in which the old one moves, too many to run both for a comparison; give intervals "
+            f"that are less far apart"
+        )
     other = record if scans[0] == scans[1] else _again(record, scans[1])
     mine_at, theirs_at = _times(record), _times(other)
     if not theirs_at.size:

@@ -8,7 +8,7 @@ from random import Random
 from typing import Final
 
 from tools.fuzz import phrases
-from tools.fuzz.case import OLD, Case, Kind
+from tools.fuzz.case import FORCED_NUMPY, OLD, Case, Kind
 from tools.fuzz.corpus.commands import corpus
 from tools.fuzz.library import a_card, changed_settings
 from tools.fuzz.vocabulary import anything, misspelt, number, text
@@ -107,7 +107,8 @@ def make(rng: Random) -> Case:
         words = _disturbed(rng, words)
     words = ["show" if _LEADS_OUTSIDE.search(word) else word for word in words]
     needed = {name: content for name, content in _FILES.items() if name in words}
-    return Case(tuple(words), needed, terminal=rng.random() < 0.05, limit=6.0 if command in ("fleet", "compare") else 2.0)
+    limit = (6.0 if command in ("fleet", "compare") else 2.0) + (FORCED_NUMPY if "numpy" in words else 0.0)
+    return Case(tuple(words), needed, terminal=rng.random() < 0.05, limit=limit)
 
 
 def _arguments(rng: Random, command: str, hostile: float) -> list[str]:

@@ -9,7 +9,7 @@ import re
 from random import Random
 from typing import Final
 
-from tools.fuzz.case import OLD, Case, Kind, Said, command
+from tools.fuzz.case import FORCED_NUMPY, OLD, Case, Kind, Said, command
 from tools.fuzz.corpus.tables import corpus
 from tools.fuzz.csv_text import damaged, rows_in
 from tools.fuzz.failures import Breach
@@ -40,7 +40,8 @@ def make(rng: Random) -> Case:
         words += ["--table", "old.csv" if dice < 0.35 else "loops.csv"]
     elif dice < 0.8:
         words.append("--json")
-    return Case(tuple(words), files, direct=rng.random() < 0.95, limit=2.0 * (1 + len(rows)))
+    each = 2.0 + (FORCED_NUMPY if "numpy" in words else 0.0)
+    return Case(tuple(words), files, direct=rng.random() < 0.95, limit=2.0 + each * len(rows))
 
 
 def _row(rng: Random, at: int, header: list[str]) -> list[str]:
