@@ -83,8 +83,8 @@ def test_a_package_of_the_index_equals_its_card() -> None:
     """simple-pid itself, driven scan by scan: the card's arithmetic is that of the package."""
 
     def make(settings: Settings, scan: float) -> Any:
-        dials = [settings[name].value for name in ("Kp", "Ki", "Kd")]
-        pid: Any = simple_pid.PID(*dials, sample_time=None, output_limits=(0, 100))
+        Kp, Ki, Kd = (settings[name].value for name in ("Kp", "Ki", "Kd"))
+        pid: Any = simple_pid.PID(Kp, Ki, Kd, sample_time=None, output_limits=(0, 100))
 
         def step(sp: float, pv: float) -> float:
             pid.setpoint = sp
