@@ -48,7 +48,7 @@ _MANY: Final = 100
 )
 @click.option("--decisions", metavar="FILE.csv", help="What people decided.")
 @click.option(
-    "--out", "folder", type=OutputArgument("folder"), metavar="FOLDER", help="Write everything there: CSV, JSON, workbook, report."
+    "--out", "folder", type=OutputArgument("folder"), metavar="FOLDER", help="Write it all there: CSV, JSON, exceptions, workbook."
 )
 @click.option(
     "--workbook/--no-workbook", "workbook", default=None, help="Write the workbook, too; by default where xlsxwriter is installed."

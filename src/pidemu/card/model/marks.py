@@ -24,7 +24,7 @@ class Names:
     sets : str
         What that setting has to set.
     words : tuple of str
-        Words that may stand there, and are no setting's name.
+        Words that may stand there, and are not a setting's name.
     """
 
     sets: str

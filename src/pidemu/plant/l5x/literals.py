@@ -85,7 +85,7 @@ def read_positional(text: str) -> Positional:
     while at < len(text):
         match = _TOKEN.match(text, at)
         if match is None:
-            raise ValueError(f"character {at + 1} is no value")
+            raise ValueError(f"character {at + 1} is not a value")
         at, token = match.end(), match[1]
         if token == "[":
             inner: list[Positional] = []
