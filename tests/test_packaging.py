@@ -94,7 +94,7 @@ for name in names:
     try:
         importlib.import_module(name)
     except ModuleNotFoundError as error:
-        assert error.name in ("numba", "jinja2", "matplotlib", "scipy", "pyarrow", "distributed"), (name, error)
+        assert error.name in ("numba", "jinja2", "matplotlib", "scipy", "pyarrow", "distributed", "hypothesis", "pytest"), (name, error)
 print(len(names))
 """
 """Imports all modules; those that need an extra may say so."""
