@@ -90,11 +90,12 @@ for card in pidemu.cards():
 EVERY_MODULE = """
 import importlib, pkgutil, pidemu
 names = [m.name for m in pkgutil.walk_packages(pidemu.__path__, "pidemu.") if not m.name.endswith("__main__")]
+extras = "numba jinja2 matplotlib scipy pyarrow distributed hypothesis pytest".split()
 for name in names:
     try:
         importlib.import_module(name)
     except ModuleNotFoundError as error:
-        assert error.name in ("numba", "jinja2", "matplotlib", "scipy", "pyarrow", "distributed", "hypothesis", "pytest"), (name, error)
+        assert error.name in extras, (name, error)
 print(len(names))
 """
 """Imports all modules; those that need an extra may say so."""
