@@ -21,7 +21,7 @@ from tests.cli.helpers import said
 PV = np.array([50.0, 51.0, 1e300, 50.0, 50.0, -1e300, 51.0, 50.0, 50.0])
 KNOWN = [
     "advanced-pid/advanced-pid", "arduino/pid", "ardupilot/ac-pid", "bacnet/loop", "crazyflie/pid",
-    "dvg/pid-controller", "epics/epid", "esphome/pid", "gnc-tools/cpid", "iec/61131-3-pid", "klipper/control-pid", "mathworks/pid2",
+    "dvg/pid-controller", "epics/epid", "esphome/pid", "gnc-tools/cpid", "iec/61131-3-pid", "mathworks/pid2",
     "modelica/limpid", "ni/pid", "node-pid-controller/controller", "openbmc/pid", "oscat/ctrl-pi", "oscat/ctrl-pid", "oscat/ft-pid",
     "oscat/ft-pidw", "oscat/ft-pidwl", "oscat/ft-piw", "px4/pid", "ros/control-toolbox", "sedona/lp", "simple-pid/simple-pid",
     "simplefoc/pid", "wpilib/pid-controller",

@@ -75,8 +75,10 @@ def _behind_the_filters(settings: Settings, w: Floats, setpoint: bool) -> Comple
 def needed(card: Card, options: dict[str, object] | None = None) -> dict[str, object]:
     """Values for the dials that a conversion does not compute and the card has no default for."""
     equation = card.variant(options).equation
+    within = equation.integral.limits
+    low = None if within is None else within.low
     return {
-        n: working(*limits(s))
+        n: -working(*limits(s)) if n == low else working(*limits(s))
         for n, s in equation.settings.items()
         if s.default is None and is_active(equation, n, s) and not is_computed(equation, n, Role(s.sets)) and s.sets != "multiplier"
     }
