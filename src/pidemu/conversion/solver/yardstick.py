@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from pidemu.certificate.linear import bands, certify, compare_paths, deviation
@@ -88,9 +89,7 @@ class Yardstick:
         """Return by what settings are judged: the change of Ms with a process, else the deviation in the loop band."""
         if self.process is None:
             return self.continuous_deviation(settings)
-        from pidemu.analysis.figures import loop_figures
-
-        old, new = (loop_figures(law, self.process, f).Ms for law, f in ((self.law, self.factor), (settings.law(), 1.0)))
+        old, new = _Ms(self.law, self.process, self.factor), _Ms(settings.law(), self.process, 1.0)
         if not (math.isfinite(old) and math.isfinite(new)):
             return self.continuous_deviation(settings)
         return abs(new / old - 1)
@@ -100,6 +99,14 @@ class Yardstick:
         if self.scans is None or self.at_source_scan is None:
             return None
         return scan_cost(self.at_source_scan, settings.law(self.scans[1]), self.factor, self.process)
+
+
+@lru_cache(maxsize=256)
+def _Ms(law: Law, process: Process, factor: float) -> float:
+    """Return Ms of a loop; choices of options share the source's, and many share the target's."""
+    from pidemu.analysis.figures import loop_figures
+
+    return loop_figures(law, process, factor).Ms
 
 
 def first_of(mode: Modes) -> Mode:
