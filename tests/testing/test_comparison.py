@@ -9,6 +9,7 @@ import pytest
 import simple_pid
 
 import pidemu
+from pidemu.card.library import card_files
 from pidemu.settings.settings import Settings
 from pidemu.testing import AdapterError, DifferenceError, assert_equals, assert_equivalent, over_arrays
 from tests.testing.mine import Mine, StartsFromZero, WindsUp, WrongSignOfD
@@ -164,3 +165,14 @@ def test_what_is_wrong_with_card_or_interval_is_told_as_ever() -> None:
         assert_equals("generic/standart", Mine)
     with pytest.raises(pidemu.ScanError):
         assert_equals(SETTINGS, Mine, scan=-1.0)
+
+
+@pytest.mark.parametrize("card", card_files())
+def test_the_emulator_of_every_card_equals_itself(card: str) -> None:
+    """Whatever the settings, in manual and while they change: nothing of the driving differs between the two sides."""
+
+    def make(settings: Settings, scan: float, limits: Any, action: Any, initial_output: float) -> pidemu.Controller:
+        return pidemu.Controller(settings, scan, action, limits, initial_output=initial_output)
+
+    modes: Any = ("automatic", "manual", "changes")
+    assert_equals(card, make, scan=0.5, modes=modes, tolerance=0, examples=15, scans=20)
