@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.testing.test_plugin import LOADED
+from tests.testing.installed import LOADED
 from tools.regenerate.pages import ROOT, prepare, read
 
 PAGE = ROOT / "docs" / "testing.md"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+
+from tests.testing.installed import LOADED
 
 HERE = Path(__file__).parent
 PROJECT = """\
@@ -39,7 +40,6 @@ def test_no_settings(pidemu_settings):
 def test_no_card(pidemu_settings):
     pass
 """
-LOADED = any(e.name == "pidemu" and e.value == "pidemu.testing.plugin" for e in entry_points(group="pytest11"))
 pytestmark = pytest.mark.skipif(not LOADED, reason="pidemu is not installed with its entry points")
 
 
